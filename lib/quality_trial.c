@@ -25,7 +25,7 @@ enum {
 #define PART_OF_PROMISE 0.7
 /* More rays or samples are not tried if the last ones left more than this share of the error. */
 #define STUCK_SHARE 0.9
-/* More samples are not tried if the error is farther away than this many gains. */
+/* More samples are not tried if the error would be too large without this many gains. */
 #define MAX_GAINS 4
 /* Pixels of voxels below this width average several voxels. Errors along rays average out too. */
 #define NARROW_PX 0.5
@@ -49,7 +49,7 @@ typedef struct trying {
     int truth_rays;
     double truth_error, across_error; /* that the truth may have; its part of the rays */
     trip_choice best;                 /* the best so far */
-    double gain;      /* decrease of the error from two to four samples, at the last rays */
+    double gain;      /* difference of pictures with two and four samples */
     double least;     /* least error of the last tries of samples or rays */
     double best_cost; /* of a choice within the promise; HUGE_VAL if there is none */
 } trying;
@@ -355,14 +355,14 @@ static int try_samples(trying *y, int rays, double lod_px)
             continue;
         }
         const double before = i > 1 && way > 0 ? c.error : 0;
+        const double help = MAX_GAINS * y->gain, wanted = PART_OF_PROMISE * t->promise;
         status = try(y, &c);
         const bool within = is_within(y, &c);
         if ((within && way > 0) || (!within && way < 0))
             return status;
-        if (i == 1 && !within && c.error - MAX_GAINS * y->gain > PART_OF_PROMISE * t->promise)
+        /* errors of rays and of samples add up in squares */
+        if (i == 1 && !within && c.error * c.error - help * help > wanted * wanted)
             return status;
-        if (i == 2 && way > 0)
-            y->gain = fmax(before - c.error, 0);
         /* more samples no longer help: the rest of the error has another cause */
         if (!within && way > 0 && c.error > STUCK_SHARE * before)
             return status;
@@ -418,12 +418,19 @@ static int try_levels(trying *y)
 
 static int try_all(trying *y)
 {
+    const trip_choice few = { .samples_per_sheet = 2, .rays = 1 };
+    const trip_choice more = { .samples_per_sheet = 4, .rays = 1 };
     y->best = (trip_choice){ .error = HUGE_VAL };
-    y->best_cost = y->least = y->gain = HUGE_VAL;
+    y->best_cost = y->least = HUGE_VAL;
     if (y->trial->preferred) {
         trip_choice c = *y->trial->preferred;
         int status = try(y, &c);
         if (status || is_within(y, &c))
+            return status;
+    }
+    if (!y->trial->has_samples) {
+        int status = compare(y, &few, &more, &y->gain);
+        if (status)
             return status;
     }
     return try_levels(y);

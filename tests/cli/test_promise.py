@@ -27,7 +27,7 @@ class Promise(program.ProgramTest):
     @classmethod
     def setUpClass(cls):
         super().setUpClass()
-        program.write_nrrd("v.nrrd", ripples(64))
+        program.write_nrrd("v.nrrd", ripples(32))
         run = program.call("brick", "v.nrrd", "-o", "v.trip", "-q", "--keep-all", "--tile", 16)
         assert run.returncode == 0, run.stderr
         for name, text in FUNCTIONS.items():
@@ -40,7 +40,7 @@ class Promise(program.ProgramTest):
 
     def test_means_of_errors_are_within_the_promise(self):
         for name in FUNCTIONS:
-            for size in 24, 80:
+            for size in 16, 48:
                 view = ("--tf", f"{name}.tf", "--size", size)
                 exact = self.picture("v.trip", *view, "--renderer", "integral")
                 object_ = exact[..., 3] > 0.5 / 255
@@ -52,14 +52,14 @@ class Promise(program.ProgramTest):
 
     def test_the_default_alone_would_break_it(self):
         """Without choices, the same pictures are farther away. So the test above can fail."""
-        view = ("--tf", "step.tf", "--size", 24)
+        view = ("--tf", "step.tf", "--size", 16)
         exact = self.picture("v.trip", *view, "--renderer", "integral")
         drawn = self.picture("v.trip", *view, "--renderer", "cpu", "--samples", 1, "--lod", 0,
                              "--samples-per-sheet", 2)
         self.assertGreater(255 * abs(drawn - exact)[exact[..., 3] > 0.5 / 255].mean(), 1)
 
     def test_given_numbers_draw_the_same_bits_as_chosen_ones(self):
-        view = ("--renderer", "cpu", "--tf", "step.tf", "--size", 24)
+        view = ("--renderer", "cpu", "--tf", "step.tf", "--size", 16)
         chosen = self.stats("v.trip", *view)
         lod = chosen.get("lod_px", 0)
         given = self.picture("v.trip", *view, "--samples", chosen["samples"], "--lod", repr(lod),
