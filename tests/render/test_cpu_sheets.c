@@ -420,6 +420,30 @@ static void check_gradients(const trip_cpu_kernels *k, uint64_t squares)
         }
 }
 
+/* Voxel n of a square in Morton order has the column of its even bits and the row of its odd bits.
+ * Code 0 counts as 1. */
+static void check_decode(const trip_cpu_kernels *k, uint64_t mask)
+{
+    uint16_t codes[64 + 32];
+    int next = 0;
+    for (int i = 0; i < 64 + 32; i++)
+        codes[i] =
+            (uint16_t)(i % 5 ? scene_hash(i, 3, 11) % 65536 : 65535u * (unsigned)(i / 5 % 2));
+    out = rasters[0];
+    k->sheet_decode(codes, mask, out.codes + 8 * TRIP_CPU_RASTER_STRIDE + 16);
+    for (int n = 0; n < 64; n++) {
+        const int u = 16 + (n & 1) + (n >> 1 & 2) + (n >> 2 & 4);
+        const int v = 8 + (n >> 1 & 1) + (n >> 2 & 2) + (n >> 3 & 4);
+        int16_t *at = &out.codes[v * TRIP_CPU_RASTER_STRIDE + u];
+        if (!(mask >> n & 1))
+            continue;
+        const int code = codes[next++];
+        assert_int_equal(*at, (code ? code : 1) - TRIP_CPU_CODE_BIAS);
+        *at = (int16_t)code_at(0, u, v);
+    }
+    assert_memory_equal(&out, &rasters[0], sizeof out); /* no other voxel is written */
+}
+
 static void check_ranges(const trip_cpu_kernels *k, uint64_t squares)
 {
     trip_cpu_square_ranges ranges;
@@ -529,6 +553,9 @@ static void kernels_prepare_sheets_like_plain_code(void **state)
     fill_rasters();
     fill_deviations();
     for (const trip_cpu_kernels *const *isa = trip_cpu_isas(); *isa; isa++) {
+        check_decode(*isa, UINT64_MAX);
+        check_decode(*isa, UINT64_C(0xf00f123480000001));
+        check_decode(*isa, 1);
         check_ranges(*isa, UINT64_MAX);
         check_ranges(*isa, UINT64_C(0x8040201008040281));
         check_gradients(*isa, UINT64_MAX);

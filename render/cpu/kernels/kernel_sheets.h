@@ -56,6 +56,21 @@ typedef struct trip_cpu_voxels {
 typedef int16_t trip_cpu_deviations[TRIP_CPU_RASTER_VOXELS];
 #define TRIP_CPU_DEVIATION_PARTS 128
 
+/* Offset of a square's voxel in a raster from the square's first voxel, by Morton number n. */
+#define TRIP_CPU_PLACE(n)                                                                          \
+    ((((n) >> 1 & 1) | ((n) >> 2 & 2) | ((n) >> 3 & 4)) * TRIP_CPU_RASTER_STRIDE +                 \
+     (((n)&1) | ((n) >> 1 & 2) | ((n) >> 2 & 4)))
+#define TRIP_CPU_PLACES4(n)                                                                        \
+    TRIP_CPU_PLACE(n), TRIP_CPU_PLACE((n) + 1), TRIP_CPU_PLACE((n) + 2), TRIP_CPU_PLACE((n) + 3)
+#define TRIP_CPU_PLACES16(n)                                                                       \
+    TRIP_CPU_PLACES4(n), TRIP_CPU_PLACES4((n) + 4), TRIP_CPU_PLACES4((n) + 8),                     \
+        TRIP_CPU_PLACES4((n) + 12)
+static const uint16_t trip_cpu_places[64] = { TRIP_CPU_PLACES16(0), TRIP_CPU_PLACES16(16),
+                                              TRIP_CPU_PLACES16(32), TRIP_CPU_PLACES16(48) };
+#undef TRIP_CPU_PLACES16
+#undef TRIP_CPU_PLACES4
+#undef TRIP_CPU_PLACE
+
 /* An index of a code in a pool of rasters must fit 32 bits. */
 #define TRIP_CPU_RASTERS_MAX (INT32_MAX / (int32_t)(sizeof(trip_cpu_voxels) / sizeof(int16_t)))
 

@@ -330,6 +330,9 @@ typedef struct trip_cpu_kernels {
     uint32_t (*drawn)(const trip_cpu_view *view, trip_cpu_scratch *s, const trip_cpu_splat *splats,
                       uint32_t count);
 
+    /* Writes the codes of a square's records, biased, to the voxels of `mask`. `to` is the square's
+     * first voxel in a raster. Writes no other voxel. Any codes may follow those of the records. */
+    void (*sheet_decode)(const uint16_t codes[64 + 32], uint64_t mask, int16_t *to);
     /* Computes the ranges of codes of the given squares in a raster. All other squares get an empty
      * range. */
     void (*sheet_ranges)(const trip_cpu_voxels *raster, uint64_t squares,

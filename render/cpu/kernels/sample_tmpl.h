@@ -168,6 +168,61 @@ INLINE void vh_store_3(int16_t *p, vh a, vh b, vh c)
 
 static_assert(sizeof(trip_cpu_gradient) == 3 * sizeof(int16_t), "three numbers in a row");
 
+#if TRIP_SIMD == TRIP_SIMD_AVX512 && defined(__AVX512VBMI2__)
+
+/* Morton numbers of the voxels of four rows of a square, row by row. */
+#define ROW8(n) (n), (n) + 1, (n) + 4, (n) + 5, (n) + 16, (n) + 17, (n) + 20, (n) + 21
+typedef int16_t four_rows __attribute__((vector_size(64)));
+static const four_rows morton_of_rows = { ROW8(0), ROW8(2), ROW8(8), ROW8(10) };
+#undef ROW8
+
+/* Writes the voxels of four rows that have a bit in `mask`. Other threads may write the other
+ * voxels meanwhile. */
+INLINE void decode_rows(const uint16_t codes[32], uint32_t mask, int16_t *to)
+{
+    const four_rows missing = (four_rows){ 0 } + TRIP_CPU_CODE_MISSING;
+    four_rows at = (four_rows)_mm512_maskz_expand_epi16(mask, _mm512_loadu_si512(codes));
+    at = (at - (at == 0)) ^ INT16_MIN;
+    at = (four_rows)_mm512_mask_mov_epi16((__m512i)missing, mask, (__m512i)at);
+    const __m512i rows = _mm512_permutexvar_epi16((__m512i)morton_of_rows, (__m512i)at);
+    const uint32_t bits = _mm512_cmpneq_epi16_mask(rows, (__m512i)missing);
+#define STORE_ROW(i)                                                                               \
+    _mm_mask_storeu_epi16(to + (i)*TRIP_CPU_RASTER_STRIDE, (__mmask8)(bits >> 8 * (i)),            \
+                          _mm512_extracti32x4_epi32(rows, i))
+    STORE_ROW(0);
+    STORE_ROW(1);
+    STORE_ROW(2);
+    STORE_ROW(3);
+#undef STORE_ROW
+}
+
+static void sheet_decode(const uint16_t codes[64 + 32], uint64_t mask, int16_t *to)
+{
+    const uint32_t first = (uint32_t)mask;
+    decode_rows(codes, first, to);
+    decode_rows(codes + __builtin_popcount(first), (uint32_t)(mask >> 32),
+                to + 4 * TRIP_CPU_RASTER_STRIDE);
+}
+
+#else
+
+static void sheet_decode(const uint16_t codes[64 + 32], uint64_t mask, int16_t *to)
+{
+    int16_t biased[64];
+    const int16_t *next = biased;
+    for (int i = 0; i < 64; i++)
+        biased[i] = (int16_t)((codes[i] + (codes[i] == 0)) ^ TRIP_CPU_CODE_BIAS);
+    if (mask == UINT64_MAX) { /* each pair of voxels is adjacent in a row */
+        for (unsigned i = 0; i < 64; i += 2)
+            memcpy(to + trip_cpu_places[i], biased + i, 2 * sizeof *biased);
+        return;
+    }
+    for (uint64_t rest = mask; rest; rest &= rest - 1)
+        to[trip_cpu_places[__builtin_ctzll(rest)]] = *next++;
+}
+
+#endif
+
 INLINE int square_first(int square)
 {
     return square / TRIP_CPU_SQUARES_ACROSS * 8 * TRIP_CPU_RASTER_STRIDE +

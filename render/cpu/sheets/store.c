@@ -218,21 +218,9 @@ void trip_cpu_store_drop(trip_cpu_store *s, trip_cpu_sheet *sheet)
 
 /* ---- from a run to voxels ---- */
 
-/* Offset of a square's voxel in a raster from the square's first voxel, by Morton number n. */
-#define PLACE(n)                                                                                   \
-    ((((n) >> 1 & 1) | ((n) >> 2 & 2) | ((n) >> 3 & 4)) * TRIP_CPU_RASTER_STRIDE +                 \
-     (((n)&1) | ((n) >> 1 & 2) | ((n) >> 2 & 4)))
-#define PLACES4(n) PLACE(n), PLACE((n) + 1), PLACE((n) + 2), PLACE((n) + 3)
-#define PLACES16(n) PLACES4(n), PLACES4((n) + 4), PLACES4((n) + 8), PLACES4((n) + 12)
-
-static const uint16_t positions[64] = { PLACES16(0), PLACES16(16), PLACES16(32), PLACES16(48) };
-
-/* Writes the draw codes of a square's records, stretched and biased. The local arrays cannot alias,
- * so the compiler vectorises the loops. */
-static void square_codes(const trip_cpu_store *s, const trip_square *at, int16_t out[64])
+/* Writes the draw codes of a square's records, stretched. */
+static void square_codes(const trip_cpu_store *s, const trip_square *at, uint16_t codes[64])
 {
-    uint16_t codes[64];
-    int16_t biased[64];
     const uint32_t count = at->count;
     const trip_cpu_codes stretch = s->codes;
     trip_square_codes(at, codes);
@@ -242,23 +230,6 @@ static void square_codes(const trip_cpu_store *s, const trip_square *at, int16_t
     if (stretch.shift > 0)
         for (uint32_t i = 0; i < count; i++)
             codes[i] = trip_cpu_code(stretch, codes[i]);
-    for (uint32_t i = 0; i < count; i++)
-        biased[i] = (int16_t)((codes[i] + (codes[i] == 0)) ^ TRIP_CPU_CODE_BIAS);
-    memcpy(out, biased, sizeof *out * count);
-}
-
-static void decode_square(const trip_cpu_store *s, int16_t *to, const trip_square *at)
-{
-    int16_t codes[64];
-    const int16_t *next = codes;
-    square_codes(s, at, codes);
-    if (at->mask == UINT64_MAX) { /* each pair of voxels is adjacent in a row */
-        for (unsigned i = 0; i < 64; i += 2)
-            memcpy(to + positions[i], codes + i, 2 * sizeof *codes);
-        return;
-    }
-    for (uint64_t rest = at->mask; rest; rest &= rest - 1)
-        to[positions[__builtin_ctzll(rest)]] = *next++;
 }
 
 /* Writes the deviations of a square's records, which begin at `from`. */
@@ -270,7 +241,7 @@ static void decode_deviations(const trip_cpu_store *s, int16_t *to, const trip_s
     if (s->draw->of_stored)
         trip_square_codes(at, codes);
     for (uint64_t rest = at->mask; rest; rest &= rest - 1, n++) {
-        int16_t *d = &to[positions[__builtin_ctzll(rest)]];
+        int16_t *d = &to[trip_cpu_places[__builtin_ctzll(rest)]];
         *d = (int16_t)(from[n] * TRIP_CPU_DEVIATION_PARTS);
         if (s->draw->of_stored)
             *d = (int16_t)lrint(trip_draw_deviation(s->draw, codes[n], from[n]) *
@@ -284,11 +255,21 @@ static bool is_within(const trip_cpu_store *s, int64_t u, int64_t v)
            v < s->first_v + s->down;
 }
 
+/* Adds squares of a raster to those with voxels. */
+static void add_filled(const trip_cpu_sheet *sheet, size_t at, uint64_t squares)
+{
+    if (squares)
+        atomic_fetch_or_explicit(&sheet->filled[at], squares, memory_order_relaxed);
+}
+
 void trip_cpu_store_decode(const trip_cpu_store *s, const trip_cpu_sheet *sheet,
                            const trip_block *block, const trip_run *run)
 {
     trip_square squares[TRIP_BLOCK_SQUARES_MAX];
     const uint32_t count = trip_block_squares(block, squares);
+    uint16_t codes[64 + 32] = { 0 };
+    uint64_t filled = 0; /* squares of raster `last`; an atomic step waits for all stores */
+    size_t last = 0;
     for (const trip_square *square = squares; square < squares + count; square++) {
         int u = run->u + 8 * trip_cpu_square_u(square->number);
         int v = run->v + 8 * trip_cpu_square_v(square->number);
@@ -302,12 +283,17 @@ void trip_cpu_store_decode(const trip_cpu_store *s, const trip_cpu_sheet *sheet,
         if (!sheet->rasters[at] || !(s->open[at] & bit))
             continue;
         const int first = v * TRIP_CPU_RASTER_STRIDE + u;
-        decode_square(s, s->voxels[sheet->rasters[at]].codes + first, square);
+        square_codes(s, square, codes);
+        s->kernels->sheet_decode(codes, square->mask, s->voxels[sheet->rasters[at]].codes + first);
         if (s->blurs && block->deviations)
             decode_deviations(s, s->deviations[sheet->rasters[at]] + first, square,
                               block->deviations + square->first);
-        atomic_fetch_or_explicit(&sheet->filled[at], bit, memory_order_relaxed);
+        if (at != last)
+            add_filled(sheet, last, filled);
+        filled = (at != last ? 0 : filled) | bit;
+        last = at;
     }
+    add_filled(sheet, last, filled);
 }
 
 /* ---- neighbours and visibility ---- */
