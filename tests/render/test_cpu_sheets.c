@@ -486,10 +486,10 @@ static int64_t between(int a, int b, int w)
 }
 
 /* Squares at the right and lower edge use voxels beyond the edge. All others are left unchanged. */
-static void check_between(const trip_cpu_kernels *k, int w, bool gradients, uint64_t squares)
+static void check_between(const trip_cpu_kernels *k, int w, unsigned parts, uint64_t squares)
 {
     out = rasters[0];
-    k->sheet_between(&rasters[3], &rasters[4], squares, w << 16 | (16384 - w), gradients, &out);
+    k->sheet_between(&rasters[3], &rasters[4], squares, w << 16 | (16384 - w), parts, &out);
     for (int v = 0; v <= 64; v++)
         for (int u = 0; u <= 64; u++) {
             int a = code_at(3, u, v), b = code_at(4, u, v), i = v * TRIP_CPU_RASTER_STRIDE + u;
@@ -500,12 +500,17 @@ static void check_between(const trip_cpu_kernels *k, int w, bool gradients, uint
                                     sizeof out.gradients[i]);
                 continue;
             }
-            assert_int_equal(out.codes[i], is_missing(a) || is_missing(b) ? TRIP_CPU_CODE_MISSING
+            const bool missing = is_missing(a) || is_missing(b);
+            assert_int_equal(out.codes[i], !(parts & TRIP_CPU_PART_CODES) ? rasters[0].codes[i]
+                                           : missing                      ? TRIP_CPU_CODE_MISSING
                                                                           : between(a, b, w));
-            for (int n = 0; gradients && n < 3 && !is_missing(out.codes[i]); n++)
-                assert_int_equal(
-                    out.gradients[i].along[n],
-                    between(rasters[3].gradients[i].along[n], rasters[4].gradients[i].along[n], w));
+            for (int n = 0; n < 3 && !missing; n++) {
+                const int16_t *from = rasters[3].gradients[i].along;
+                const int16_t *to = rasters[4].gradients[i].along;
+                assert_int_equal(out.gradients[i].along[n], parts & TRIP_CPU_PART_GRADIENTS
+                                                                ? between(from[n], to[n], w)
+                                                                : rasters[0].gradients[i].along[n]);
+            }
         }
 }
 
@@ -549,6 +554,7 @@ static void check_deviations(const trip_cpu_kernels *k, int w, uint64_t squares)
 
 static void kernels_prepare_sheets_like_plain_code(void **state)
 {
+    const unsigned both = TRIP_CPU_PART_CODES | TRIP_CPU_PART_GRADIENTS;
     (void)state;
     fill_rasters();
     fill_deviations();
@@ -563,9 +569,11 @@ static void kernels_prepare_sheets_like_plain_code(void **state)
         check_cells(*isa, -5, 1);
         check_cells(*isa, TRIP_CPU_CODE_MIN, INT16_MAX);
         check_cells(*isa, 2, 290);
-        check_between(*isa, 8192, true, UINT64_MAX);
-        check_between(*isa, 5461, true, UINT64_C(0x8040201008040281));
-        check_between(*isa, 0, false, UINT64_MAX);
+        check_between(*isa, 8192, both, UINT64_MAX);
+        check_between(*isa, 5461, both, UINT64_C(0x8040201008040281));
+        check_between(*isa, 0, TRIP_CPU_PART_CODES, UINT64_MAX);
+        check_between(*isa, 8192, TRIP_CPU_PART_CODES, UINT64_C(0x8040201008040281));
+        check_between(*isa, 8192, TRIP_CPU_PART_GRADIENTS, UINT64_C(0x8040201008040281));
         check_deviations(*isa, 8192, UINT64_MAX);
         check_deviations(*isa, 5461, UINT64_C(0x8040201008040281));
     }

@@ -420,13 +420,14 @@ INLINE vh mean_or_between(vh a, vh b, int32_t weights)
 
 /* Interpolates eight voxels from `at` on. */
 INLINE void voxels_between(const trip_cpu_voxels *from, const trip_cpu_voxels *to, int at,
-                           int32_t weights, bool gradients, trip_cpu_voxels *out)
+                           int32_t weights, unsigned parts, trip_cpu_voxels *out)
 {
     vh a = vh_load(from->codes + at), b = vh_load(to->codes + at);
-    vh codes = vh_select(vh_is_missing(a) | vh_is_missing(b), mean_or_between(a, b, weights),
-                         vh_set(TRIP_CPU_CODE_MISSING));
-    vh_store(out->codes + at, codes);
-    gradients = gradients && !all_are_missing(codes);
+    vh missing = vh_is_missing(a) | vh_is_missing(b);
+    if (parts & TRIP_CPU_PART_CODES)
+        vh_store(out->codes + at,
+                 vh_select(missing, mean_or_between(a, b, weights), vh_set(TRIP_CPU_CODE_MISSING)));
+    const bool gradients = parts & TRIP_CPU_PART_GRADIENTS && vh_bits(missing) != 0xff;
     const int16_t *c = (const int16_t *)&from->gradients[at];
     const int16_t *d = (const int16_t *)&to->gradients[at];
     int16_t *numbers = (int16_t *)&out->gradients[at];
@@ -440,18 +441,19 @@ INLINE int16_t number_between(int16_t a, int16_t b, int32_t weights)
 }
 
 INLINE void voxel_between(const trip_cpu_voxels *from, const trip_cpu_voxels *to, int at,
-                          int32_t weights, bool gradients, trip_cpu_voxels *out)
+                          int32_t weights, unsigned parts, trip_cpu_voxels *out)
 {
     const int16_t a = from->codes[at], b = to->codes[at];
     const bool missing = a == TRIP_CPU_CODE_MISSING || b == TRIP_CPU_CODE_MISSING;
-    out->codes[at] = missing ? TRIP_CPU_CODE_MISSING : number_between(a, b, weights);
-    for (int i = 0; i < 3 && gradients; i++)
+    if (parts & TRIP_CPU_PART_CODES)
+        out->codes[at] = missing ? TRIP_CPU_CODE_MISSING : number_between(a, b, weights);
+    for (int i = 0; i < 3 && parts & TRIP_CPU_PART_GRADIENTS; i++)
         out->gradients[at].along[i] =
             number_between(from->gradients[at].along[i], to->gradients[at].along[i], weights);
 }
 
 INLINE void squares_between(const trip_cpu_voxels *from, const trip_cpu_voxels *to,
-                            uint64_t squares, int32_t weights, bool gradients, trip_cpu_voxels *out)
+                            uint64_t squares, int32_t weights, unsigned parts, trip_cpu_voxels *out)
 {
     const int last = TRIP_CPU_SQUARES_ACROSS - 1;
     for (uint64_t rest = squares; rest; rest &= rest - 1) {
@@ -459,9 +461,9 @@ INLINE void squares_between(const trip_cpu_voxels *from, const trip_cpu_voxels *
         const int rows = square / TRIP_CPU_SQUARES_ACROSS == last ? 9 : 8;
         int at = square_first(square);
         for (int row = 0; row < rows; row++, at += TRIP_CPU_RASTER_STRIDE) {
-            voxels_between(from, to, at, weights, gradients, out);
+            voxels_between(from, to, at, weights, parts, out);
             if (square % TRIP_CPU_SQUARES_ACROSS == last)
-                voxel_between(from, to, at + 8, weights, gradients, out);
+                voxel_between(from, to, at + 8, weights, parts, out);
         }
     }
 }
@@ -509,13 +511,16 @@ static void sheet_rows(const int16_t *deviations, uint64_t squares, uint8_t out[
 
 static __attribute__((noinline)) void sheet_between(const trip_cpu_voxels *from,
                                                     const trip_cpu_voxels *to, uint64_t squares,
-                                                    int32_t weights, bool gradients,
+                                                    int32_t weights, unsigned parts,
                                                     trip_cpu_voxels *out)
 {
-    if (weights == (8192 << 16 | 8192))
-        squares_between(from, to, squares, 8192 << 16 | 8192, gradients, out);
+    const int32_t halves = 8192 << 16 | 8192;
+    if (weights == halves && parts == TRIP_CPU_PART_CODES)
+        squares_between(from, to, squares, halves, TRIP_CPU_PART_CODES, out);
+    else if (weights == halves && parts == TRIP_CPU_PART_GRADIENTS)
+        squares_between(from, to, squares, halves, TRIP_CPU_PART_GRADIENTS, out);
     else
-        squares_between(from, to, squares, weights, gradients, out);
+        squares_between(from, to, squares, weights, parts, out);
 }
 
 #endif

@@ -64,13 +64,10 @@ static bool take_voxels(trip_cpu_store *s, uint64_t min, uint64_t wanted)
     return s->voxels != NULL;
 }
 
-/* Lays out a sheet's arrays for making on demand. Returns the offset behind them. */
-static size_t lay_out_making(trip_cpu_sheet *sheet, char *memory, size_t at, size_t grid)
+static size_t lay_out_on_demand(trip_cpu_on_demand *d, char *memory, size_t at, size_t grid)
 {
-    trip_cpu_making *m = &sheet->making;
-    m->rasters = sheet->rasters;
-    m->begun = trip_cpu_take_array(memory, &at, grid * sizeof *m->begun);
-    m->made = trip_cpu_take_array(memory, &at, grid * sizeof *m->made);
+    d->begun = trip_cpu_take_array(memory, &at, grid * sizeof *d->begun);
+    d->made = trip_cpu_take_array(memory, &at, grid * sizeof *d->made);
     return at;
 }
 
@@ -88,12 +85,15 @@ static size_t lay_out(trip_cpu_store *s, char *memory)
         if (s->blurs)
             sheet->rows = trip_cpu_take_array(memory, &at, grid * sizeof *sheet->rows);
         sheet->needed = trip_cpu_take_array(memory, &at, grid * sizeof *sheet->needed);
-        at = lay_out_making(sheet, memory, at, grid);
+        sheet->making.rasters = sheet->rasters;
+        at = lay_out_on_demand(&sheet->making.gradients, memory, at, grid);
     }
     for (int i = 0; i < TRIP_CPU_SAMPLES_MAX; i++) {
         trip_cpu_sheet *sample = &s->samples[i];
         sample->rasters = trip_cpu_take_array(memory, &at, grid * sizeof *sample->rasters);
-        at = lay_out_making(sample, memory, at, grid);
+        sample->making.rasters = sample->rasters;
+        at = lay_out_on_demand(&sample->making.codes, memory, at, grid);
+        at = lay_out_on_demand(&sample->making.gradients, memory, at, grid);
     }
     s->some = trip_cpu_take_array(memory, &at, grid * sizeof *s->some);
     s->open = trip_cpu_take_array(memory, &at, grid * sizeof *s->open);
@@ -187,6 +187,15 @@ bool trip_cpu_store_fit(trip_cpu_store *s, const trip_cpu_rasters *all, unsigned
     return true;
 }
 
+/* Lets threads make all squares of a raster. */
+static void forget_made(const trip_cpu_on_demand *d, size_t at)
+{
+    if (!d->begun)
+        return;
+    atomic_store_explicit(&d->begun[at], 0, memory_order_relaxed);
+    atomic_store_explicit(&d->made[at], 0, memory_order_relaxed);
+}
+
 bool trip_cpu_store_take(trip_cpu_store *s, trip_cpu_sheet *sheet, size_t at)
 {
     if (s->free_count == 0)
@@ -194,8 +203,8 @@ bool trip_cpu_store_take(trip_cpu_store *s, trip_cpu_sheet *sheet, size_t at)
     sheet->rasters[at] = s->free[--s->free_count];
     if (sheet->filled)
         atomic_store_explicit(&sheet->filled[at], 0, memory_order_relaxed);
-    atomic_store_explicit(&sheet->making.begun[at], 0, memory_order_relaxed);
-    atomic_store_explicit(&sheet->making.made[at], 0, memory_order_relaxed);
+    forget_made(&sheet->making.codes, at);
+    forget_made(&sheet->making.gradients, at);
     return true;
 }
 
@@ -712,7 +721,9 @@ static void cut_raster(const work_job *job, const trip_cpu_sheet_work *w, size_t
 {
     const trip_cpu_store *s = job->store;
     s->kernels->sheet_between(raster_at(s, w->other, at), raster_at(s, w->third, at), UINT64_MAX,
-                              w->sheet->making.weights, w->other->shaded,
+                              w->sheet->making.weights,
+                              TRIP_CPU_PART_CODES |
+                                  (w->other->shaded ? TRIP_CPU_PART_GRADIENTS : 0),
                               raster_at(s, w->sheet, at));
     if (s->blurs)
         s->kernels->sheet_deviations_between(
