@@ -38,9 +38,11 @@ static void repeat_gradients(const trip_cpu_group *g, const trip_cpu_making *m, 
     if (right && m->rasters[at + 1]) {
         const trip_cpu_gradient *from = raster_of(g, m->rasters, at + 1)->gradients;
         make_gradients(g, m, at + 1, right);
-        for (int v = 0; v < SIDE; v++)
-            if (right >> v / 8 * ACROSS & 1)
+        for (uint64_t rest = right; rest; rest &= rest - 1) {
+            const int first = __builtin_ctzll(rest) / ACROSS * 8;
+            for (int v = first; v < first + 8; v++)
                 to[v * TRIP_CPU_RASTER_STRIDE + SIDE] = from[v * TRIP_CPU_RASTER_STRIDE];
+        }
     }
     to += SIDE * TRIP_CPU_RASTER_STRIDE;
     if (below && m->rasters[at + down]) {
@@ -56,11 +58,24 @@ static void repeat_gradients(const trip_cpu_group *g, const trip_cpu_making *m, 
     }
 }
 
+/* Fetches the memory of the squares' gradients before they are computed. */
+INLINE void prefetch_gradients(trip_cpu_voxels *raster, uint64_t squares)
+{
+    for (uint64_t rest = squares; rest; rest &= rest - 1) {
+        const trip_cpu_gradient *at = raster->gradients + square_first(__builtin_ctzll(rest));
+        for (int row = 0; row < 8; row++, at += TRIP_CPU_RASTER_STRIDE) {
+            __builtin_prefetch(at, 1);
+            __builtin_prefetch(at + 7, 1);
+        }
+    }
+}
+
 /* Makes the gradients of squares of a raster. The calling thread has claimed them in `begun`. */
 static void make_own_gradients(const trip_cpu_group *g, const trip_cpu_making *m, size_t at,
                                uint64_t squares)
 {
     trip_cpu_voxels *raster = raster_of(g, m->rasters, at);
+    prefetch_gradients(raster, squares);
     if (!m->from) {
         (TRIP_CPU_NEAREST ? sheet_outlines : sheet_gradients)(
             raster, squares, raster_of(g, m->rasters, at - 1),

@@ -403,11 +403,17 @@ static void copy_gradients_beside(const work_job *job, const trip_cpu_sheet_work
     last[TRIP_CPU_RASTER] = raster_at(s, w->sheet, at + across + 1)->gradients[0];
 }
 
+/* Returns the squares with voxels of a present raster. All other squares have an empty range. */
+static uint64_t filled_in(const trip_cpu_sheet *sheet, size_t at)
+{
+    return atomic_load_explicit(&sheet->filled[at], memory_order_relaxed);
+}
+
 static void find_ranges(const work_job *job, const trip_cpu_sheet_work *w, size_t at)
 {
     const trip_cpu_store *s = job->store;
     copy_codes_beside(job, w, at);
-    const uint64_t filled = atomic_load_explicit(&w->sheet->filled[at], memory_order_relaxed);
+    const uint64_t filled = filled_in(w->sheet, at);
     s->kernels->sheet_ranges(raster_at(s, w->sheet, at), filled, &w->sheet->ranges[at]);
     if (s->blurs)
         find_rows(s, w->sheet, at, filled);
@@ -606,7 +612,9 @@ static void find_visible(const work_job *job, const trip_cpu_sheet_work *w, size
     const bool blurs = job->store->blurs;
     uint8_t rows[64];
     if (w->other->rasters[at])
-        for (int i = 0; i < 64; i++) {
+        for (uint64_t rest = filled_in(w->sheet, at) & filled_in(w->other, at); rest;
+             rest &= rest - 1) {
+            const int i = __builtin_ctzll(rest);
             bool any = a->min[i] <= a->max[i] && b->min[i] <= b->max[i];
             int16_t min = a->min[i] < b->min[i] ? a->min[i] : b->min[i];
             int16_t max = a->max[i] > b->max[i] ? a->max[i] : b->max[i];
