@@ -334,7 +334,7 @@ typedef struct trip_cpu_kernels {
                       uint32_t count);
 
     /* Writes the codes of a square's records, biased, to the voxels of `mask`. `to` is the square's
-     * first voxel in a raster. Writes no other voxel. Any codes may follow those of the records. */
+     * first voxel in a raster. Writes no other voxel. Any codes may follow the records' codes. */
     void (*sheet_decode)(const uint16_t codes[64 + 32], uint64_t mask, int16_t *to);
     /* Computes the ranges of codes of the given squares in a raster. All other squares get an empty
      * range. */

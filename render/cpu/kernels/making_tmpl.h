@@ -100,7 +100,7 @@ INLINE uint64_t claim(const trip_cpu_on_demand *d, size_t at, uint64_t squares, 
     return to_make;
 }
 
-/* Announces the squares that the thread has made, and waits for those of other threads. */
+/* Announces the squares that the thread has made, and waits for squares of other threads. */
 static void finish(const trip_cpu_on_demand *d, size_t at, uint64_t to_make, uint64_t own)
 {
     if (own)

@@ -1155,7 +1155,7 @@ INLINE vf ray_depth(const stamp_rays *l, vf along)
 
 #define ALL_LANES UINT32_MAX
 
-/* Finds the gradients of open rays at a sample plane, making those of their squares before. */
+/* Makes the squares of open rays at a sample plane, and finds the rays' gradients. */
 static void find_sparse_gradients(const trip_cpu_group *g, unsigned n, vm open, sample *s)
 {
     const trip_cpu_making *m = g->samples[n].making;
@@ -1170,8 +1170,8 @@ static void find_sparse_gradients(const trip_cpu_group *g, unsigned n, vm open, 
             box.hi[a] = greater_of(box.hi[a], cell);
         }
     make_gradients_of_box(g, m, box);
-    /* Other rays read the gradient of the missing raster, since another thread may be making those
-     * of their squares. */
+    /* Another thread may be making the squares of the other rays. These rays read the gradient of
+     * the missing raster. */
     const vi none = { 0 };
     find_gradients(g, (vi)v_select(open, (vf)s->gradient_at, (vf)none), s);
     s->lit = vm_bits(open);
