@@ -88,7 +88,7 @@ static size_t lay_out(trip_cpu_store *s, char *memory)
         sheet->making.rasters = sheet->rasters;
         at = lay_out_on_demand(&sheet->making.gradients, memory, at, grid);
     }
-    for (int i = 0; i < TRIP_CPU_SAMPLES_MAX; i++) {
+    for (unsigned i = 0; i < s->sample_room; i++) {
         trip_cpu_sheet *sample = &s->samples[i];
         sample->rasters = trip_cpu_take_array(memory, &at, grid * sizeof *sample->rasters);
         sample->making.rasters = sample->rasters;
@@ -149,17 +149,18 @@ void trip_cpu_store_move(trip_cpu_store *s, const trip_cpu_rasters *to)
     trip_cpu_store_clear(s, 0);
 }
 
-static uint64_t grid_bytes(const trip_cpu_rasters *all, unsigned sheets, bool blurs)
+static uint64_t grid_bytes(const trip_cpu_rasters *all, unsigned sheets, unsigned samples,
+                           bool blurs)
 {
-    trip_cpu_store of = { .sheet_room = sheets, .blurs = blurs };
+    trip_cpu_store of = { .sheet_room = sheets, .sample_room = samples, .blurs = blurs };
     set_grid(&of, all);
     return lay_out(&of, NULL);
 }
 
-uint64_t trip_cpu_store_bytes(const trip_cpu_rasters *all, unsigned sheets, uint64_t rasters,
-                              bool blurs)
+uint64_t trip_cpu_store_bytes(const trip_cpu_rasters *all, unsigned sheets, unsigned samples,
+                              uint64_t rasters, bool blurs)
 {
-    uint64_t grids = has_grid(all) ? grid_bytes(all, sheets, blurs) : UINT64_MAX / 2;
+    uint64_t grids = has_grid(all) ? grid_bytes(all, sheets, samples, blurs) : UINT64_MAX / 2;
     return grids + (rasters + 1) * (raster_bytes(blurs) + sizeof(int32_t));
 }
 
@@ -169,15 +170,18 @@ uint64_t trip_cpu_store_held_bytes(const trip_cpu_store *s)
 }
 
 bool trip_cpu_store_fit(trip_cpu_store *s, const trip_cpu_rasters *all, unsigned sheets,
-                        uint64_t min, uint64_t max, uint64_t room)
+                        unsigned samples, uint64_t min, uint64_t max, uint64_t room)
 {
     const uint64_t greatest = TRIP_CPU_RASTERS_MAX - 1;
-    if (min > greatest || !has_grid(all) || trip_cpu_store_bytes(all, sheets, min, s->blurs) > room)
+    if (min > greatest || !has_grid(all) ||
+        trip_cpu_store_bytes(all, sheets, samples, min, s->blurs) > room)
         return false;
     max = max < greatest ? max : greatest;
-    uint64_t fit =
-        (room - grid_bytes(all, sheets, s->blurs)) / (raster_bytes(s->blurs) + sizeof *s->free) - 1;
+    uint64_t fit = (room - grid_bytes(all, sheets, samples, s->blurs)) /
+                       (raster_bytes(s->blurs) + sizeof *s->free) -
+                   1;
     s->sheet_room = sheets;
+    s->sample_room = samples;
     set_grid(s, all);
     if (s->rasters > fit + 1)
         release_voxels(s);
