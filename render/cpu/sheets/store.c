@@ -316,6 +316,7 @@ typedef struct work_job {
     trip_cpu_store *store;
     const trip_cpu_sheet_work *work;
     const trip_cpu_tf *function;
+    bool either; /* also for rasters that only `other` has */
     /* Called for each present raster. */
     void (*each)(const struct work_job *job, const trip_cpu_sheet_work *w, size_t at);
 } work_job;
@@ -331,7 +332,7 @@ static void work_row(void *context, unsigned task, unsigned thread)
         return;
     for (int32_t u = 1; u < s->across - 1; u++) {
         size_t at = (size_t)(task % rows + 1) * (size_t)s->across + (size_t)u;
-        if (w->sheet->rasters[at])
+        if (w->sheet->rasters[at] || (job->either && w->other->rasters[at]))
             job->each(job, w, at);
     }
 }
@@ -652,9 +653,9 @@ static uint64_t beside(const trip_cpu_edges *e, int edge)
            ((behind[edge] & behind[TRIP_CPU_LEFT]) << 7 & TRIP_CPU_COLUMN_7);
 }
 
-/* Finds the squares from which visible segments read voxels. Outermost rasters have no visible
- * squares, so their edges are empty. With uneven spacing a segment may cross any number of squares,
- * so all are needed. */
+/* Finds the squares from which visible segments read voxels, in either sheet. Outermost rasters
+ * have no visible squares, so their edges are empty. With uneven spacing a segment may cross any
+ * number of squares, so all are needed. */
 static void find_needed(const work_job *job, const trip_cpu_sheet_work *w, size_t at)
 {
     const trip_cpu_edges *e = &w->sheet->edges[at];
@@ -670,7 +671,7 @@ void trip_cpu_store_find_visible(trip_cpu_store *s, const trip_cpu_sheet_work *w
                                  const trip_cpu_tf *f)
 {
     run_work(&(work_job){ .store = s, .work = work, .function = f, .each = find_visible }, count);
-    run_work(&(work_job){ .store = s, .work = work, .each = find_needed }, count);
+    run_work(&(work_job){ .store = s, .work = work, .either = true, .each = find_needed }, count);
 }
 
 static void find_gradients(const work_job *job, const trip_cpu_sheet_work *w, size_t at)
