@@ -282,6 +282,42 @@ static void grids_too_wide_for_the_memory_are_drawn_in_windows(void **state)
     scene_destroy(&uneven);
 }
 
+/* Patches of a few squares are visible or not. So the rays of a small picture that are next to each
+ * other are lit in different segments. */
+static bool patchy(void *user, int i, int j, int k, unsigned *code, double gradient[3])
+{
+    (void)user;
+    (void)gradient;
+    *code = scene_hash(i / 9, j / 7, k / 3) % 4 ? 20000 + 20 * (unsigned)(i + j)
+                                                : 40000 + scene_hash(i, j, k) % 20000;
+    return true;
+}
+
+/* With more memory, more sheets of an earlier group have left gradients in the pool. */
+static void small_pictures_are_lit_by_gradients_of_their_own_sheets(void **state)
+{
+    enum { EDGE = 12 };
+    static float much[4 * EDGE * EDGE], little[4 * EDGE * EDGE];
+    (void)state;
+    scene s;
+    scene_create(
+        &s, &(scene_params){
+                .dims = { 140, 130, 40 }, .tile_voxels = 64, .slab_sheets = 4, .voxel = patchy });
+    scene_colour(&s, 33000, 65535, 0.9, 0.4, 0.1, 0.05);
+    for (int i = 0; i < 12; i++) {
+        trip_settings settings = post(2 + i % 2);
+        trip_camera_params view = i / 2 % 2 ? parallel(&s) : from_outside(&s);
+        view.width = view.height = 8 + i / 4 * 2;
+        const scene_picture p = { .width = view.width, .height = view.height, .rgba = much };
+        assert_int_equal(cpu_scenes_draw_within(&s, UINT64_C(256) << 20, &settings, &view, much),
+                         0);
+        assert_int_equal(cpu_scenes_draw_within(&s, 6 << 20, &settings, &view, little), 0);
+        assert_shows(&p);
+        assert_memory_equal(much, little, 16 * (size_t)view.width * (size_t)view.height);
+    }
+    scene_destroy(&s);
+}
+
 static bool solid(void *user, int i, int j, int k, unsigned *code, double gradient[3])
 {
     (void)user;
@@ -921,6 +957,7 @@ int main(void)
         cmocka_unit_test(any_tile_of_the_data_and_any_batch_draw_the_same),
         cmocka_unit_test(any_memory_draws_the_same_or_is_reported_as_too_little),
         cmocka_unit_test(grids_too_wide_for_the_memory_are_drawn_in_windows),
+        cmocka_unit_test(small_pictures_are_lit_by_gradients_of_their_own_sheets),
         cmocka_unit_test(occlusion_culling_draws_the_same),
         cmocka_unit_test(instruction_sets_agree),
         cmocka_unit_test(kept_integrals_equal_recomputed_ones),
