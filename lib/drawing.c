@@ -41,7 +41,7 @@ static session drawn_session(const triptych *t)
     return s;
 }
 
-/* Releases the picture of the parts already drawn. */
+/* Releases the pictures of the parts already drawn and of several rays per pixel. */
 static void drop_before(triptych *t)
 {
     trip_budget_release(t->session.budget, t->before, t->before_bytes);
@@ -305,11 +305,18 @@ static int choose_bands(triptych *t)
                      t->turned.width, t->turned.height, side * side);
 }
 
-/* Allocates the picture of the parts already drawn, and one more if there are three parts or more.
+/* Returns how many pictures hold the parts already drawn: one, or two with three parts or more. */
+static size_t pictures_of_parts(const triptych *t)
+{
+    return t->parts.count > 2 ? 2 : t->parts.count > 1;
+}
+
+/* Allocates the pictures of the parts already drawn, and one more for several rays per pixel.
  * Called after planning, before the reader takes its share of the memory left. */
 static int take_before(triptych *t)
 {
-    const size_t pictures = t->parts.count > 2 ? 2 : t->parts.count > 1;
+    const int side = pixels_a_side(t);
+    const size_t pictures = pictures_of_parts(t) + (side > 1);
     const size_t bytes = pictures * pixels_drawn(t) * 4 * sizeof *t->before;
     if (bytes != t->before_bytes)
         drop_before(t);
@@ -319,6 +326,11 @@ static int take_before(triptych *t)
     t->before_bytes = t->before ? bytes : 0;
     if (t->before)
         return 0;
+    if (side > 1)
+        return trip_fail(TRIP_ERROR, "render", "samples",
+                         "a picture %d times as wide and high does not fit in memory; raise "
+                         "--memory or lower --samples",
+                         side);
     return trip_fail(TRIP_ERROR, "render", "levels",
                      "the pictures of several levels do not fit in memory; raise --memory");
 }
@@ -653,18 +665,10 @@ static int take_colours(triptych *t, float *rgba, float *depth)
     const int side = pixels_a_side(t);
     if (side == 1)
         return take_drawn(t, rgba, depth);
-    trip_budget *budget = t->session.budget;
-    size_t bytes = pixels_drawn(t) * 4 * sizeof *rgba;
-    float *fine = trip_budget_take(budget, bytes);
-    if (!fine)
-        return trip_fail(TRIP_ERROR, "render", "samples",
-                         "a picture %d times as wide and high does not fit in memory; raise "
-                         "--memory or lower --samples",
-                         side);
+    float *fine = t->before + pictures_of_parts(t) * 4 * pixels_drawn(t);
     int status = take_drawn(t, fine, NULL);
     if (!status)
         take_means(fine, side, t->turned.width, rows_drawn(t) / side, rgba);
-    trip_budget_release(budget, fine, bytes);
     return status;
 }
 

@@ -58,7 +58,8 @@ struct triptych {
     unsigned level;       /* of at_level, otherwise 0 */
     trip_lod_parts parts; /* of the begun frame */
     int part;             /* index of the part that is drawn */
-    /* Picture of the parts before `part`, taken from the budget; otherwise NULL. */
+    /* Pictures of the parts before `part`, and one of several rays per pixel. They are taken from
+     * the budget. NULL if there are none. */
     float *before;
     /* Size of `before`, which may be kept for the next frame. */
     size_t before_bytes;
