@@ -49,8 +49,8 @@ typedef struct trying {
     int truth_rays;
     double truth_error, across_error; /* that the truth may have; its part of the rays */
     trip_choice best;                 /* the best so far */
-    double gain;      /* difference of pictures with two and four samples */
-    double least;     /* least error of the last tries of samples or rays */
+    double gain;                      /* difference of pictures with two and four samples */
+    double least;                     /* least error of the last tries of samples or rays */
     double best_cost; /* of a choice within the promise; HUGE_VAL if there is none */
 } trying;
 
