@@ -6,7 +6,7 @@
 // where it is constant.
 #include "shared.h"
 
-#if defined(EXACT) || (defined(BLURRED) && defined(WIDE))
+#if defined(EXACT) || defined(WIDE)
 #define BEYOND
 #define segment_between segment_within
 #endif

@@ -158,7 +158,10 @@ static void codes_beyond_the_table_agree_with_the_reference(void **state)
     settings.kernel = TRIP_KERNEL_CUBIC;
     for (int number = 0; number < 3; number++) {
         const trip_camera_params view = level_scene_view(&l, number, PIXELS);
+        settings.deviations = true;
         compare("beyond the table", &l, &view, &settings);
+        settings.deviations = false;
+        compare("beyond the table, not blurred", &l, &view, &settings);
     }
     level_scene_destroy(&l);
 }
