@@ -66,10 +66,10 @@ static bool may_choose(const triptych *t)
 }
 
 /* Returns whether levels are not chosen. Light and distances allow only one level, and the trial
- * sees no light. GL draws levels without their deviations. */
+ * sees no light. */
 static bool needs_finest(const triptych *t)
 {
-    return t->required == TRIPTYCH_RENDERER_GL || t->settings.depth || t->session.part_count > 1 ||
+    return t->settings.depth || t->session.part_count > 1 ||
            t->given.effects.which & ~TRIPTYCH_EFFECT_CUEING ||
            trip_dataset_levels(t->session.data, TRIP_KIND_VALUES) == 0;
 }
