@@ -83,7 +83,7 @@ struct triptych {
     bool reader_counts;  /* `reader` was made for exact counts */
 
     trip_choices choices;     /* of earlier frames */
-    uint64_t choices_read;    /* checksum of the data set whose stored choices were read; or 0 */
+    uint64_t choices_read;    /* checksum of a data set: its stored choices were read; or 0 */
     char *choices_folder;     /* keeps choices; NULL: none */
     trip_choice choice;       /* of the begun frame */
     const trip_choice *fixed; /* in the context of a trial: the choice; otherwise NULL */
