@@ -225,7 +225,7 @@ static void print_rows(FILE *f, const cJSON *rows, const char *title)
     static const measure_column columns[] = {
         { "name", "setting", 0, 0 }, { "ms", "ms", 1, 0 },
         { "error", "error", 2, 0 },  { "total.mean", "mean", 2, 0 },
-        { "promise", "aim", 1, 0 },  { "rays.mean", "along rays", 2, 0 },
+        { "promise", "promise", 1, 0 },  { "rays.mean", "along rays", 2, 0 },
     };
     if (rows && rows->child)
         measure_table_print(f, &(measure_table){ .title = title,
@@ -244,7 +244,7 @@ static void print_explanation(FILE *f, const accuracy_report *r)
             "picture, of 255,\n       in red, green, blue and opacity, in the worst of the views.\n"
             "       The exact picture has the mean of the integral over the area of each pixel.\n"
             "mean:  the mean difference from the exact picture, over all views.\n"
-            "aim:   the mean that the quality aims at, and may miss.\n"
+            "promise: the mean that the quality promises.\n"
             "along rays: the mean difference from the integral along the same rays, one per "
             "pixel.\n"
             "ms:    the median time of a frame, in milliseconds. The fastest setting comes first.\n"

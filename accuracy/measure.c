@@ -348,7 +348,7 @@ static int need_reference(sweep *s, const accuracy_row *row)
     int status = accuracy_contexts_draw(&s->contexts, row->data, TRIPTYCH_RENDERER_REFERENCE,
                                         &settings, s->pictures[REFERENCE], &ms);
     memcpy(s->pictures[FINE], s->pictures[REFERENCE], s->picture_bytes);
-    settings.lod.voxel_px = 0;
+    settings.lod.voxel_px = TRIPTYCH_ZERO;
     if (!status && row->setting.settings.lod.voxel_px > 0)
         status = accuracy_contexts_draw(&s->contexts, row->data, TRIPTYCH_RENDERER_REFERENCE,
                                         &settings, s->pictures[FINE], &ms);

@@ -66,7 +66,7 @@ static void write_table(FILE *f, const accuracy_report *r)
         { "name", "settings", 0, 0 },        { "ms", "ms", 1, 0 },
         { "error", "error", 2, 0 },          { "splats", "million splats", 3, 1e6 },
         { "bytes_read", "MB read", 2, 1e6 }, { "total.max", "max", 1, 0 },
-        { "total.mean", "mean", 2, 0 },      { "promise", "aim of mean", 1, 0 },
+        { "total.mean", "mean", 2, 0 },      { "promise", "promise", 1, 0 },
         { "total.median", "median", 2, 0 },  { "total.percentile_99", "99 %", 2, 0 },
         { "total.psnr", "PSNR", 1, 0 },      { "total.ssim", "SSIM", 4, 0 },
         { "total.flip", "FLIP", 4, 0 },      { "pixel", "pixel", 2, 0 },
@@ -84,8 +84,8 @@ static void write_table(FILE *f, const accuracy_report *r)
           "are at most this far from the exact picture, of 255, in red, green, blue and opacity, "
           "in the "
           "worst view. Every setting that is faster than a bold one has a larger error. The other "
-          "figures are over all views together, and over all channels. <b>aim of mean</b> is the "
-          "mean that a quality aims at, and may miss. The last columns split the "
+          "figures are over all views together, and over all channels. <b>promise</b> is the "
+          "mean that a quality promises. The last columns split the "
           "error into steps, as mean / 99th percentile. <b>pixel</b> compares the integral along "
           "the rays of the setting with the exact picture. Only more rays per pixel make it "
           "smaller. <b>along rays</b> compares the picture with the integral along the same rays. "

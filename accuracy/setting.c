@@ -24,18 +24,13 @@ __attribute__((format(printf, 4, 5))) static void add(sweep *w, triptych_rendere
     one->settings = s;
 }
 
-/* The order of triptych_quality. */
-static const struct {
-    const char *name;
-    double promise; /* mean error of 255; 0 if the quality promises none */
-} qualities[] = { { "draft", 4 }, { "normal", 1 }, { "high", 0.3 }, { "exact", 0 } };
 
 static void add_qualities(sweep *w, const draw_settings *defaults)
 {
-    for (size_t i = 0; i < sizeof qualities / sizeof *qualities; i++) {
+    for (int q = TRIPTYCH_QUALITY_DRAFT; q <= TRIPTYCH_QUALITY_EXACT; q++) {
         draw_settings s = *defaults;
-        s.all.quality = (triptych_quality)(TRIPTYCH_QUALITY_DRAFT + i);
-        add(w, TRIPTYCH_RENDERER_CPU, s, "quality-%s", qualities[i].name);
+        s.all.quality = (triptych_quality)q;
+        add(w, TRIPTYCH_RENDERER_CPU, s, "quality-%s", draw_settings_choice(&s, DRAW_QUALITY));
     }
 }
 
@@ -156,6 +151,7 @@ static void add_renderers(sweep *w)
 {
     draw_settings s = w->post;
     s.all.samples = s.sheet.samples = 0; /* the mean over the area */
+    s.lod.voxel_px = 0;
     add(w, TRIPTYCH_RENDERER_GL, w->post, "gl-post");
     add(w, TRIPTYCH_RENDERER_GL, w->pre, "gl-pre");
     add(w, TRIPTYCH_RENDERER_REFERENCE, w->post, "reference-post");
@@ -186,7 +182,7 @@ draw_settings accuracy_setting_fixed(const draw_settings *defaults, triptych_cla
     draw_settings s = *defaults;
     s.all.classify = classify;
     s.all.samples = 1;
-    s.lod.voxel_px = 0;
+    s.lod.voxel_px = TRIPTYCH_ZERO;
     if (classify == TRIPTYCH_CLASSIFY_POST)
         s.sheet.samples = 4;
     return s;
@@ -212,8 +208,8 @@ int accuracy_settings(accuracy_setting out[ACCURACY_SETTINGS_MAX], const draw_se
 
 double accuracy_setting_promise(const accuracy_setting *s)
 {
-    const int i = (int)s->settings.all.quality - TRIPTYCH_QUALITY_DRAFT;
-    return i >= 0 && i < (int)(sizeof qualities / sizeof *qualities) ? qualities[i].promise : 0;
+    const triptych_quality quality = s->settings.all.quality;
+    return quality ? draw_settings_promise(quality) : 0;
 }
 
 /* Target and submission differ in rounding only. The reference renderer does not round. */

@@ -22,6 +22,7 @@ static const uint64_t min_limit = UINT64_C(4) << 30;
 /* Suffixes of files that a killed process may leave, besides its lock. */
 static const char *const leftovers[] = { ".trip.partial", ".trip.spill", ".trip.replaced",
                                          ".gone" };
+static const char choices_suffix[] = ".quality";
 enum { LEFTOVERS = sizeof leftovers / sizeof leftovers[0] };
 
 static const char *file_name(const cache_key *key, const char *suffix, char name[NAME_BYTES])
@@ -465,8 +466,49 @@ int cache_folder_list(const cache_folder *c, cache_entry **out, size_t *count)
     return status;
 }
 
+char *cache_folder_choices(void)
+{
+    cache_folder c;
+    trip_held_report held;
+    char *path = NULL;
+    trip_report_hold(&held);
+    if (cache_folder_open(&c, true) == 0)
+        path = strdup(c.path);
+    trip_report_release(&held);
+    cache_folder_close(&c);
+    return path;
+}
+
+typedef struct counting {
+    size_t count;
+    uint64_t bytes;
+} counting;
+
+static int count_choices(const cache_folder *c, const char *name, const cache_key *key,
+                         const char *rest, void *user)
+{
+    counting *all = user;
+    struct stat st;
+    (void)key;
+    if (strcmp(rest, choices_suffix) || fstatat(c->fd, name, &st, AT_SYMLINK_NOFOLLOW) < 0)
+        return 0;
+    all->count++;
+    all->bytes += (uint64_t)st.st_size;
+    return 0;
+}
+
+int cache_folder_count_choices(const cache_folder *c, size_t *count, uint64_t *bytes)
+{
+    counting all = { 0 };
+    int status = visit_names(c, count_choices, &all);
+    *count = all.count;
+    *bytes = all.bytes;
+    return status;
+}
+
 typedef struct cleaning {
     const listing *kept; /* the data sets that remain */
+    bool choices;        /* removes choices */
     cache_left *left;
 } cleaning;
 
@@ -490,6 +532,11 @@ static int clean_name(const cache_folder *c, const char *name, const cache_key *
             unlinkat(c->fd, name, 0);
         return 0;
     }
+    if (!strcmp(rest, choices_suffix)) {
+        if (cl->choices)
+            remove_obstacle(c, name);
+        return 0;
+    }
     size_t length = strlen(rest);
     if (length > 5 && !strcmp(rest + length - 5, ".link"))
         unlinkat(c->fd, name, 0);
@@ -507,12 +554,12 @@ static int clean_name(const cache_folder *c, const char *name, const cache_key *
     return 0;
 }
 
-static int clean(const cache_folder *c, cache_left *left)
+static int clean(const cache_folder *c, bool choices, cache_left *left)
 {
     listing kept = { 0 };
     int status = cache_folder_list(c, &kept.entries, &kept.count);
     if (status == 0)
-        status = visit_names(c, clean_name, &(cleaning){ &kept, left });
+        status = visit_names(c, clean_name, &(cleaning){ &kept, choices, left });
     free(kept.entries);
     return status;
 }
@@ -534,7 +581,7 @@ int cache_folder_shrink(const cache_folder *c, uint64_t bytes, cache_left *out)
     }
     free(entries);
     if (status == 0)
-        status = clean(c, &left);
+        status = clean(c, bytes == 0, &left);
     if (out)
         *out = left;
     return status;

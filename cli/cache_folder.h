@@ -6,6 +6,7 @@
  *
  *   KEY.trip    a data set; its modification time is the time of its last use.
  *   STATE.link  a symbolic link from the state of a volume's files to the source of its data sets.
+ *   KEY.quality the choices of quality for a data set, also for data sets outside the cache.
  *   KEY.lock, KEY.trip.partial, KEY.trip.spill, KEY.gone    while one is made or removed.
  *
  * Only the user may write in the folder. No operation follows a link in it, or removes anything
@@ -80,13 +81,20 @@ void cache_folder_unlock(const cache_folder *c, const cache_key *key, int fd);
  * Fails if something remains. */
 int cache_folder_make_room(const cache_folder *c, const cache_key *key);
 
+/* Returns the folder's path for triptych_resources.choices_folder, for free(). Returns NULL without
+ * a message if the folder cannot be used. */
+char *cache_folder_choices(void);
+/* Counts the files with choices, and their bytes. */
+int cache_folder_count_choices(const cache_folder *c, size_t *count, uint64_t *bytes);
+
 /* Lists all data sets, the least recently used first; the caller frees *out. */
 int cache_folder_list(const cache_folder *c, cache_entry **out, size_t *count);
 /* Returns false if the data set is in use or in the making, or cannot be removed. `locked` says
  * that the caller has the lock. */
 bool cache_folder_remove(const cache_folder *c, const cache_key *key, bool locked);
 /* Removes the least recently used data sets until all take at most `bytes`, then the leftovers of
- * killed processes. Data sets in use or in the making stay. `left` may be NULL. */
+ * killed processes. Removes all choices too if `bytes` is 0. Data sets in use or in the making
+ * stay. `left` may be NULL. */
 int cache_folder_shrink(const cache_folder *c, uint64_t bytes, cache_left *left);
 
 #endif

@@ -82,7 +82,14 @@ static const char *format_time(int64_t ns, bool for_people, char text[32])
     return text;
 }
 
-static void print_text(const cache_folder *c, const cache_entry *entries, size_t count)
+/* The files with choices of quality. */
+typedef struct kept_choices {
+    size_t count;
+    uint64_t bytes;
+} kept_choices;
+
+static void print_text(const cache_folder *c, const cache_entry *entries, size_t count,
+                       const kept_choices *choices)
 {
     char bytes[32], limit[32], used[32];
     uint64_t total = 0;
@@ -96,6 +103,9 @@ static void print_text(const cache_folder *c, const cache_entry *entries, size_t
     if (c->fd >= 0)
         printf(" of at most %s (TRIPTYCH_CACHE_SIZE)", trip_format_bytes(c->limit_bytes, limit));
     putchar('\n');
+    if (choices->count)
+        printf("%-9s choices of quality for %zu data set%s, %s\n", "and", choices->count,
+               choices->count == 1 ? "" : "s", trip_format_bytes(choices->bytes, bytes));
     for (size_t i = count; i-- > 0;) {
         char *path = cache_folder_path(c, &entries[i].key), *name = path ? source_name(path) : NULL;
         printf("%9s  %s  ", trip_format_bytes(entries[i].bytes, bytes),
@@ -122,12 +132,14 @@ static cJSON *entry_to_json(const cache_folder *c, const cache_entry *e)
     return object;
 }
 
-static int print_json(const cache_folder *c, const cache_entry *entries, size_t count)
+static int print_json(const cache_folder *c, const cache_entry *entries, size_t count,
+                      const kept_choices *choices)
 {
     cJSON *root = cJSON_CreateObject();
     cJSON_AddStringToObject(root, "folder", c->path);
     if (c->fd >= 0)
         cJSON_AddNumberToObject(root, "limit_bytes", (double)c->limit_bytes);
+    cJSON_AddNumberToObject(root, "choices_bytes", (double)choices->bytes);
     cJSON *list = cJSON_AddArrayToObject(root, "data_sets");
     for (size_t i = count; i-- > 0;)
         cJSON_AddItemToArray(list, entry_to_json(c, &entries[i]));
@@ -144,11 +156,14 @@ static int list(const cache_folder *c, const options *o)
 {
     cache_entry *entries = NULL;
     size_t count = 0;
+    kept_choices choices = { 0 };
     int status = c->fd < 0 ? 0 : cache_folder_list(c, &entries, &count);
+    if (status == 0 && c->fd >= 0)
+        status = cache_folder_count_choices(c, &choices.count, &choices.bytes);
     if (status == 0 && o->json)
-        status = print_json(c, entries, count);
+        status = print_json(c, entries, count, &choices);
     else if (status == 0)
-        print_text(c, entries, count);
+        print_text(c, entries, count, &choices);
     free(entries);
     return status;
 }

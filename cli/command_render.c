@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "cache_folder.h"
 #include "cached_volume.h"
 #include "clock.h"
 #include "flight.h"
@@ -27,6 +28,7 @@ typedef struct drawing {
     render_options o;
     piped_tf function;
     cached_volume volume; /* if the input is a volume */
+    char *choices_folder;
     triptych *t;
     float *rgba, *depth; /* depth is NULL without --depth */
     sequence sequence;
@@ -131,6 +133,8 @@ static int open_input(drawing *d)
 
 static int create_context(drawing *d)
 {
+    d->choices_folder = cache_folder_choices();
+    d->o.resources.choices_folder = d->choices_folder;
     d->progress = trip_progress_start();
     int status = library_create(&context, &d->progress);
     d->t = context;
@@ -175,6 +179,7 @@ static void close_drawing(drawing *d)
         triptych_close(d->t); /* frees rgba and depth too */
     }
     cached_volume_close(&d->volume);
+    free(d->choices_folder);
 }
 
 static int set_frame(drawing *d, int index)
@@ -343,6 +348,11 @@ static int draw_in_flight(drawing *d, int *first)
                        .user = d };
     if (f.contexts < 2)
         return 0;
+    if (d->choices_folder) { /* makes the trial once for all contexts */
+        int chosen = triptych_choose(d->t);
+        if (chosen)
+            return chosen;
+    }
     triptych_close(d->t);
     d->rgba = d->depth = NULL;
     d->by_cameras = true;

@@ -1,8 +1,10 @@
 /* triptych serve: starts a server that shows a data set in a browser on this machine. */
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
+#include "cache_folder.h"
 #include "commands.h"
 #include "draw_options.h"
 #include "library.h"
@@ -139,11 +141,16 @@ int trip_command_serve(int argc, char **argv)
                     .find_user = &o.volume },
     };
     int status = parse_options(&o, argc, argv);
+    char *choices_folder = status ? NULL : cache_folder_choices();
+    o.params.choices_folder = choices_folder;
     o.params.memory_bytes = o.volume.options.memory_bytes = o.resources.memory_bytes;
     o.params.threads = o.volume.options.threads = o.resources.threads;
     o.params.renderer = o.resources.renderer;
     o.params.engine = o.resources.engine;
     if (!status)
         status = check_input(&o);
-    return trip_exit_status(status ? status : trip_serve_run(&o.params));
+    if (!status)
+        status = trip_serve_run(&o.params);
+    free(choices_folder);
+    return trip_exit_status(status);
 }

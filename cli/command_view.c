@@ -3,6 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "cache_folder.h"
 #include "commands.h"
 #include "draw_options.h"
 #include "library.h"
@@ -197,12 +198,14 @@ int trip_command_view(int argc, char **argv)
     if (!o.inputs)
         return trip_exit_status(trip_fail(TRIP_ERROR, "usage", "view", "out of memory"));
     int status = parse_options(&o, argc, argv);
+    char *choices_folder = status ? NULL : cache_folder_choices();
     o.params.inputs = o.inputs;
     o.volume.samples = true;
     o.params.memory_bytes = o.volume.options.memory_bytes = o.resources.memory_bytes;
     o.params.threads = o.volume.options.threads = o.resources.threads;
     o.params.renderer = o.resources.renderer;
     o.params.engine = o.resources.engine;
+    o.params.choices_folder = choices_folder;
     o.params.user = &o.volume;
     o.params.check_output = check_output;
     o.params.check_user = &o.read;
@@ -214,6 +217,7 @@ int trip_command_view(int argc, char **argv)
     if (!status)
         status = trip_view_run(&o.params);
     read_files_release(&o.read);
+    free(choices_folder);
     free(o.inputs);
     return trip_exit_status(status);
 }

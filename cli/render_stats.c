@@ -282,8 +282,18 @@ int render_stats_describe(render_stats *s, const render_options *o, triptych *t)
     cJSON_AddStringToObject(root, "renderer", frame.renderer);
     cJSON_AddStringToObject(root, "device", frame.device);
     add_method(root, o, &frame);
-    if (o->settings.lod.voxel_px > 0)
-        cJSON_AddNumberToObject(root, "lod_px", o->settings.lod.voxel_px);
+    if (frame.lod_px > 0)
+        cJSON_AddNumberToObject(root, "lod_px", frame.lod_px);
+    if (frame.rays > 0)
+        cJSON_AddNumberToObject(root, "samples", frame.rays);
+    if (frame.promised_error > 0) {
+        cJSON *quality = cJSON_AddObjectToObject(root, "quality");
+        cJSON_AddNumberToObject(quality, "promised_error", frame.promised_error);
+        if (frame.expected_error >= 0)
+            cJSON_AddNumberToObject(quality, "expected_error", frame.expected_error);
+        cJSON_AddNumberToObject(quality, "trials", frame.trials);
+        cJSON_AddNumberToObject(quality, "trial_ms", frame.trial_ms);
+    }
     if (frame.effects) {
         cJSON *effects = cJSON_AddArrayToObject(root, "effects");
         static const char *const names[] = { "shadows", "occlusion", "cueing", NULL, "emission" };
@@ -410,6 +420,22 @@ int render_stats_explain_count(triptych *t, FILE *out)
     return each_list(t, explain_counted, out);
 }
 
+/* Writes the expected error, with the rays if a pixel has several. Says if the promise fails. */
+static void write_promise(const triptych_frame_stats *f, FILE *out)
+{
+    if (!(f->promised_error > 0) || f->expected_error < 0)
+        return;
+    if (f->rays > 1)
+        fprintf(out, ", %d rays per pixel", f->rays * f->rays);
+    if (f->lod_px > 0)
+        fputs(", coarse levels", out);
+    fprintf(out, ", error about %.2g of 255", f->expected_error);
+    if (f->expected_error > f->promised_error)
+        fprintf(out, " (more than the promised %g)", f->promised_error);
+    if (f->trial_ms > 0)
+        fprintf(out, ", trial %.2f s", f->trial_ms * 1e-3);
+}
+
 int render_stats_summary(const char *path, const render_options *o, triptych *t, FILE *out)
 {
     char count[32], text[32];
@@ -418,9 +444,11 @@ int render_stats_summary(const char *path, const render_options *o, triptych *t,
     if (status)
         return status;
     trip_text_write(out, path);
-    fprintf(out, ": %d x %d, %s %s, %s read, %.2f s\n", o->view.view.width, o->view.view.height,
+    fprintf(out, ": %d x %d, %s %s, %s read, %.2f s", o->view.view.width, o->view.view.height,
             size_print_count(frame.splats, count), things_read(o, &frame),
             trip_format_bytes(frame.bytes_read, text), frame.ms * 1e-3);
+    write_promise(&frame, out);
+    fputc('\n', out);
     return 0;
 }
 

@@ -196,8 +196,12 @@ static int check_number(const trip_option *row, const char *option, double numbe
 
 static int read_number(const trip_option *row, const char *option, const char *text, double *out)
 {
-    const bool keeps_zero = row->type == TRIP_OPTION_BELOW || row->type == TRIP_OPTION_PART;
+    const bool automatic = row->type == TRIP_OPTION_AUTO_NUMBER;
+    const bool keeps_zero =
+        row->type == TRIP_OPTION_BELOW || row->type == TRIP_OPTION_PART || automatic;
     double number = 0;
+    if (automatic && !strcmp(text, "auto"))
+        return *out = TRIP_OPTION_AUTOMATIC, 0;
     int status = trip_option_number(option, text, row->lo, row->hi, &number);
     if (!status)
         status = check_number(row, option, number);
@@ -378,6 +382,12 @@ void trip_option_print(const trip_option *row, const void *base, char text[TRIP_
     case TRIP_OPTION_CUSTOM:
         row->print(base, text, bytes);
         return;
+    case TRIP_OPTION_AUTO_NUMBER:
+        if (numbers[0] == TRIP_OPTION_AUTOMATIC) {
+            snprintf(text, bytes, "auto");
+            return;
+        }
+        /* fall through */
     case TRIP_OPTION_BELOW:
     case TRIP_OPTION_PART:
         snprintf(text, bytes, "%s",
@@ -409,6 +419,10 @@ static bool is_in_range(const trip_option *row, const void *at)
         return number > row->lo && number <= row->hi;
     case TRIP_OPTION_BELOW:
         return number == TRIP_OPTION_ZERO || (number >= row->lo && number < row->hi);
+    case TRIP_OPTION_AUTO_NUMBER:
+        if (number == TRIP_OPTION_AUTOMATIC)
+            return true;
+        /* fall through */
     case TRIP_OPTION_PART:
         return number == TRIP_OPTION_ZERO || (number >= row->lo && number <= row->hi);
     case TRIP_OPTION_RANGE:

@@ -18,16 +18,19 @@ extern "C" {
 #endif
 
 #define TRIP_OPTION_ZERO (-1.0)
+#define TRIP_OPTION_AUTOMATIC (-2.0)
 
 typedef enum trip_option_type {
-    TRIP_OPTION_FLAG,     /* int; without an argument; 1 if given */
-    TRIP_OPTION_TEXT,     /* const char *; the argument itself */
-    TRIP_OPTION_NUMBER,   /* double, lo to hi */
-    TRIP_OPTION_ABOVE,    /* double, above lo up to hi */
-    TRIP_OPTION_BELOW,    /* double, lo to below hi; 0 is stored as TRIP_OPTION_ZERO */
-    TRIP_OPTION_PART,     /* double, lo to hi; 0 is stored as TRIP_OPTION_ZERO */
-    TRIP_OPTION_INTEGER,  /* int, lo to hi */
-    TRIP_OPTION_AUTO,     /* int, lo to hi, or "auto", stored as -1 */
+    TRIP_OPTION_FLAG,    /* int; without an argument; 1 if given */
+    TRIP_OPTION_TEXT,    /* const char *; the argument itself */
+    TRIP_OPTION_NUMBER,  /* double, lo to hi */
+    TRIP_OPTION_ABOVE,   /* double, above lo up to hi */
+    TRIP_OPTION_BELOW,   /* double, lo to below hi; 0 is stored as TRIP_OPTION_ZERO */
+    TRIP_OPTION_PART,    /* double, lo to hi; 0 is stored as TRIP_OPTION_ZERO */
+    TRIP_OPTION_INTEGER, /* int, lo to hi */
+    TRIP_OPTION_AUTO,    /* int, lo to hi, or "auto", stored as -1 */
+    /* double, lo to hi; 0 is stored as TRIP_OPTION_ZERO, "auto" as TRIP_OPTION_AUTOMATIC */
+    TRIP_OPTION_AUTO_NUMBER,
     TRIP_OPTION_BYTES,    /* double; a size such as 256M */
     TRIP_OPTION_BYTES_64, /* uint64_t; a size such as 256M */
     TRIP_OPTION_CHOICE,   /* int; choices[i] is stored as first + i */

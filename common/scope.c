@@ -65,6 +65,11 @@ bool trip_scope_report_once(void)
            !__atomic_exchange_n(&ended_scope()->reported, true, __ATOMIC_RELAXED);
 }
 
+void trip_scope_report_again(void)
+{
+    trip_scope_report_anew(ended_scope());
+}
+
 void trip_scope_heed(const volatile sig_atomic_t *signalled)
 {
     trip_scope *s = trip_scope_current();

@@ -58,6 +58,8 @@ int trip_interrupted(void);
 /* Whether this thread reports the interruption of its work. Returns true once per cancelled scope
  * and once per signal. */
 bool trip_scope_report_once(void);
+/* Lets trip_scope_report_once() return true once more, because the first report reached nobody. */
+void trip_scope_report_again(void);
 
 #ifdef __cplusplus
 }

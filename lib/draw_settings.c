@@ -379,10 +379,11 @@ static const trip_option rows[DRAW_OPTIONS] = {
                              "nearest for labels, otherwise linear", .alias = "kernel",
                              .group = DRAW_GROUP_ACCURACY, .measured = true, AT(all.interpolation),
                              CHOICE(interpolations) },
-    [DRAW_LOD] = { "lod", "PX",
+    [DRAW_LOD] = { "lod", "PX|auto",
                    "Draws distant parts by coarse levels with voxels at most PX pixels wide",
-                   "0, only the finest level", .group = DRAW_GROUP_ACCURACY, .measured = true,
-                   .type = TRIP_OPTION_NUMBER, AT(lod.voxel_px), .lo = 0, .hi = 1000 },
+                   "auto, as --quality needs", "0 draws the finest level only",
+                   .group = DRAW_GROUP_ACCURACY, .measured = true, .type = TRIP_OPTION_AUTO_NUMBER,
+                   AT(lod.voxel_px), .lo = 0, .hi = 1000 },
     [DRAW_MAX_BYTES] = { "max-bytes", "SIZE",
                          "Draws coarser levels, so that at most SIZE of codes and normals is in "
                          "view, for example 64M",
@@ -393,17 +394,17 @@ static const trip_option rows[DRAW_OPTIONS] = {
                       "picture then depends on the machine",
                       .group = DRAW_GROUP_ACCURACY, .measured = true, .type = TRIP_OPTION_NUMBER,
                       AT(lod.max_ms), .lo = 1e-3, .hi = 1e9 },
-    [DRAW_SAMPLES] = { "samples", "N", "Draws N x N rays per pixel, for antialiasing",
-                       "1; with integral, the mean over the pixel's area",
+    [DRAW_SAMPLES] = { "samples", "N|auto", "Draws N x N rays per pixel, for antialiasing",
+                       "auto, as --quality needs; with integral, the mean over the pixel's area",
                        .brief = "Draws N x N rays per pixel, for antialiasing",
-                       .group = DRAW_GROUP_ACCURACY, .measured = true, .type = TRIP_OPTION_INTEGER,
+                       .group = DRAW_GROUP_ACCURACY, .measured = true, .type = TRIP_OPTION_AUTO,
                        AT(all.samples), .lo = 1, .hi = 64 },
     [DRAW_SAMPLES_PER_SHEET] = { "samples-per-sheet", "N|auto",
                                  "Sets the samples per sheet of post; more come closer to the "
                                  "integral",
-                                 "auto, 2 to 6", .alias = "slices", .group = DRAW_GROUP_ACCURACY,
-                                 .measured = true, .type = TRIP_OPTION_AUTO, AT(sheet.samples),
-                                 .lo = 1, .hi = 16 },
+                                 "auto, as --quality needs", .alias = "slices",
+                                 .group = DRAW_GROUP_ACCURACY, .measured = true,
+                                 .type = TRIP_OPTION_AUTO, AT(sheet.samples), .lo = 1, .hi = 16 },
     [DRAW_DEPTH] = { "depth", "FILE",
                      "Writes the mean distance from the eye to the visible object at each pixel, "
                      "in world units: .exr or .tif",
@@ -557,6 +558,14 @@ char *draw_settings_text(const draw_settings *s)
         return text;
     free(text);
     return NULL;
+}
+
+double draw_settings_promise(triptych_quality quality)
+{
+    return quality == TRIPTYCH_QUALITY_DRAFT   ? 4
+           : quality == TRIPTYCH_QUALITY_HIGH  ? 0.3
+           : quality == TRIPTYCH_QUALITY_EXACT ? 0
+                                               : 1;
 }
 
 const char *draw_settings_choice(const draw_settings *s, int row)

@@ -113,6 +113,8 @@ void draw_settings_unset(draw_settings *s, int row);
 const double *draw_settings_background(const draw_settings *s);
 /* Returns the name of a row's value, such as "merge"; of an unset row, the default's name. */
 const char *draw_settings_choice(const draw_settings *s, int row);
+/* Returns the mean error that a quality promises, of 255; 0 if it promises none. */
+double draw_settings_promise(triptych_quality quality);
 
 /* ---- exclusions ---- */
 

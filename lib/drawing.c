@@ -41,7 +41,7 @@ static session drawn_session(const triptych *t)
     return s;
 }
 
-/* Releases the picture of the parts already drawn. */
+/* Releases the pictures of the parts already drawn and of several rays per pixel. */
 static void drop_before(triptych *t)
 {
     trip_budget_release(t->session.budget, t->before, t->before_bytes);
@@ -52,6 +52,9 @@ static void drop_before(triptych *t)
 void trip_context_drop_renderer(triptych *t)
 {
     drop_before(t);
+    trip_budget_release(t->session.budget, t->banded, t->banded_bytes);
+    t->banded = NULL;
+    t->banded_bytes = 0;
     trip_context_drop_reader(t);
     trip_context_drop_light(t);
     if (t->renderer)
@@ -89,7 +92,7 @@ static int make_reader(triptych *t, unsigned planes)
  * pixel, renderers draw a larger picture. The integral traces several rays itself. */
 static int pixels_a_side(const triptych *t)
 {
-    return t->resources.renderer == TRIPTYCH_RENDERER_INTEGRAL ? 1 : t->settings.samples;
+    return t->resources.renderer == TRIPTYCH_RENDERER_INTEGRAL ? 1 : t->choice.rays;
 }
 
 static int make_camera(triptych *t, const trip_dataset *data)
@@ -186,7 +189,7 @@ static int choose_settings(triptych *t)
     t->why_pre = automatic && !integral ? needs_splats(t) : NULL;
     if (t->why_pre || integral)
         t->drawn_settings.classify = TRIP_CLASSIFY_PRE;
-    if (integral && !t->given.all.samples)
+    if (integral && t->given.all.samples <= 0)
         choose_areas(t);
     if (trip_coordinates_uneven(&t->session.data->coordinates) && !integral &&
         trip_settings_sum_sheets(&t->drawn_settings) &&
@@ -243,8 +246,8 @@ static int enter_part(triptych *t)
         return status;
     t->samples_per_sheet =
         trip_sheet_samples_of_view(&t->camera, drawn_session(t).data->header.dims);
-    t->drawn_settings.samples_per_sheet = t->settings.samples_per_sheet
-                                              ? t->settings.samples_per_sheet
+    t->drawn_settings.samples_per_sheet = t->choice.samples_per_sheet
+                                              ? t->choice.samples_per_sheet
                                               : t->samples_per_sheet.samples_per_sheet;
     if (t->drawn_settings.kernel == TRIP_KERNEL_NEAREST) /* boxes are exact (sheet.h) */
         t->drawn_settings.samples_per_sheet = 2;
@@ -253,16 +256,67 @@ static int enter_part(triptych *t)
     return 0;
 }
 
-static size_t pixels_drawn(const triptych *t)
+/* ---- bands ---- */
+
+/* Returns the number of rows of the current band, in pixels of the frame. */
+static int rows_drawn(const triptych *t)
 {
-    return (size_t)t->camera.width * (size_t)t->camera.height;
+    const int rest = t->camera.height - t->band * t->band_rows;
+    return t->bands > 1 && t->band_rows < rest ? t->band_rows : rest;
 }
 
-/* Allocates the picture of the parts already drawn, and one more if there are three parts or more.
+static size_t pixels_drawn(const triptych *t)
+{
+    return (size_t)t->camera.width * (size_t)rows_drawn(t);
+}
+
+static void drop_banded(triptych *t)
+{
+    trip_budget_release(t->session.budget, t->banded, t->banded_bytes);
+    t->banded = NULL;
+    t->banded_bytes = 0;
+}
+
+/* Divides a frame of several rays per pixel into bands, if its pixels would take more than a part
+ * of the memory. Only the CPU renderer can draw bands. Bits do not depend on bands. */
+static int choose_bands(triptych *t)
+{
+    enum { BYTES = 48, PART = 4 }; /* two layers and a picture; the rest is for voxels */
+    const int side = t->choice.rays, unit = TRIP_FRAME_ROWS * side;
+    const bool can = !strcmp(t->renderer->ops->name, "cpu") && trip_context_draws_values(t);
+    const double limit = (double)trip_budget_limit_bytes(t->session.budget) / PART;
+    const double rows = limit / ((double)BYTES * t->camera.width);
+    t->band = 0;
+    t->bands = 1;
+    t->band_rows = t->camera.height;
+    drop_banded(t);
+    if (side < 2 || !can || rows >= t->camera.height)
+        return 0;
+    t->band_rows = rows > unit ? (int)(rows / unit) * unit : unit;
+    t->bands = (t->camera.height + t->band_rows - 1) / t->band_rows;
+    t->banded_bytes = (size_t)t->turned.width * (size_t)t->turned.height * 4 * sizeof *t->banded;
+    t->banded = trip_budget_take(t->session.budget, t->banded_bytes);
+    if (t->banded)
+        return 0;
+    t->banded_bytes = 0;
+    return trip_fail(TRIP_ERROR, "render", "samples",
+                     "a picture of %d x %d pixels with %d rays per pixel does not fit in memory; "
+                     "raise --memory or lower --size",
+                     t->turned.width, t->turned.height, side * side);
+}
+
+/* Returns how many pictures hold the parts already drawn: one, or two with three parts or more. */
+static size_t pictures_of_parts(const triptych *t)
+{
+    return t->parts.count > 2 ? 2 : t->parts.count > 1;
+}
+
+/* Allocates the pictures of the parts already drawn, and one more for several rays per pixel.
  * Called after planning, before the reader takes its share of the memory left. */
 static int take_before(triptych *t)
 {
-    const size_t pictures = t->parts.count > 2 ? 2 : t->parts.count > 1;
+    const int side = pixels_a_side(t);
+    const size_t pictures = pictures_of_parts(t) + (side > 1);
     const size_t bytes = pictures * pixels_drawn(t) * 4 * sizeof *t->before;
     if (bytes != t->before_bytes)
         drop_before(t);
@@ -272,6 +326,11 @@ static int take_before(triptych *t)
     t->before_bytes = t->before ? bytes : 0;
     if (t->before)
         return 0;
+    if (side > 1)
+        return trip_fail(TRIP_ERROR, "render", "samples",
+                         "a picture %d times as wide and high does not fit in memory; raise "
+                         "--memory or lower --samples",
+                         side);
     return trip_fail(TRIP_ERROR, "render", "levels",
                      "the pictures of several levels do not fit in memory; raise --memory");
 }
@@ -284,9 +343,15 @@ static void keep_small_before(triptych *t)
         drop_before(t);
 }
 
+static int make_renderer(triptych *t)
+{
+    return t->renderer ? 0
+                       : trip_renderer_create(&t->renderer, (trip_renderer_kind)t->required,
+                                              t->resources.threads, t->session.budget);
+}
+
 static int prepare(triptych *t)
 {
-    session *s = &t->session;
     const triptych_resources *r = &t->resources;
     triptych_renderer renderer = r->renderer;
     int status = trip_context_check_idle(t, true);
@@ -301,10 +366,7 @@ static int prepare(triptych *t)
         status = trip_context_use_transfer_function(t, &(triptych_transfer_function){ 0 });
     if (!status && !t->has_view)
         status = trip_context_find_view(t, &(triptych_view){ 0 });
-    if (!status && !t->renderer)
-        status =
-            trip_renderer_create(&t->renderer, (trip_renderer_kind)renderer, r->threads, s->budget);
-    return status;
+    return status ? status : make_renderer(t);
 }
 
 /* Plans a frame of the integral renderer, by the kinds of lists that make up its field. */
@@ -408,6 +470,20 @@ static int plan(triptych *t)
     return status;
 }
 
+int triptych_choose(triptych *t)
+{
+    trip_scope *before = trip_context_enter_anew(t);
+    const int later = t->resources.choose_later;
+    int status = prepare(t);
+    if (!status)
+        status = choose_settings(t);
+    t->resources.choose_later = 0;
+    if (!status)
+        status = trip_context_choose_quality(t);
+    t->resources.choose_later = later;
+    return trip_context_leave(before, status);
+}
+
 static int plan_first(triptych *t)
 {
     uint64_t start = trip_now_ns();
@@ -415,9 +491,15 @@ static int plan_first(triptych *t)
     t->drawn_settings.deviations = t->renderer->ops->blurs;
     check_rounding(t);
     if (!status)
+        status = trip_context_choose_quality(t);
+    if (!status) /* a trial releases the renderer */
+        status = make_renderer(t);
+    if (!status)
         status = make_camera(t, t->session.data);
     if (!status)
         status = trip_context_choose_effects(t);
+    if (!status)
+        status = choose_bands(t);
     if (!status)
         status = choose_parts(t);
     const double ms = (double)(trip_now_ns() - start) * 1e-6;
@@ -487,6 +569,8 @@ static int start(triptych *t)
         .count = t->given.all.count_exactly,
         .progress = t->show ? show_progress : NULL,
         .progress_user = t,
+        .first_row = t->bands > 1 ? t->band * t->band_rows : 0,
+        .rows = t->bands > 1 ? rows_drawn(t) : 0,
     };
     t->drawn = status == 0;
     if (!status)
@@ -581,19 +665,33 @@ static int take_colours(triptych *t, float *rgba, float *depth)
     const int side = pixels_a_side(t);
     if (side == 1)
         return take_drawn(t, rgba, depth);
-    trip_budget *budget = t->session.budget;
-    size_t bytes = pixels_drawn(t) * 4 * sizeof *rgba;
-    float *fine = trip_budget_take(budget, bytes);
-    if (!fine)
-        return trip_fail(TRIP_ERROR, "render", "samples",
-                         "a picture %d times as wide and high does not fit in memory; raise "
-                         "--memory or lower --samples",
-                         side);
+    float *fine = t->before + pictures_of_parts(t) * 4 * pixels_drawn(t);
     int status = take_drawn(t, fine, NULL);
     if (!status)
-        take_means(fine, side, t->turned.width, t->turned.height, rgba);
-    trip_budget_release(budget, fine, bytes);
+        take_means(fine, side, t->turned.width, rows_drawn(t) / side, rgba);
     return status;
+}
+
+/* Returns the number of floats of the picture above the current band. */
+static size_t floats_above(const triptych *t)
+{
+    return (size_t)t->turned.width * (size_t)(t->band * t->band_rows / t->choice.rays) * 4;
+}
+
+/* Takes the picture of all bands drawn so far. Rows below show the background. */
+static int take_bands(triptych *t, float *rgba, float *depth)
+{
+    const size_t above = floats_above(t);
+    const size_t all = (size_t)t->turned.width * (size_t)t->turned.height * 4;
+    const double *b = t->settings.background;
+    int status = take_colours(t, rgba + above, depth);
+    if (t->bands == 1 || status)
+        return status;
+    memcpy(rgba, t->banded, above * sizeof *rgba);
+    const size_t drawn = (size_t)t->turned.width * (size_t)(rows_drawn(t) / t->choice.rays) * 4;
+    for (size_t i = above + drawn; i < all; i++)
+        rgba[i] = (float)(i % 4 < 3 ? b[i % 4] * b[3] : b[3]);
+    return 0;
 }
 
 /* Adds the drawn part to the picture of the earlier parts. */
@@ -606,18 +704,27 @@ static int keep_before(triptych *t)
     return status;
 }
 
-/* Ends a part that is drawn, and begins the next. */
+static bool has_next(const triptych *t)
+{
+    return t->part + 1 < t->parts.count || t->band + 1 < t->bands;
+}
+
+/* Ends a part or band that is drawn, and begins the next. */
 static int begin_next(triptych *t)
 {
-    int status = keep_before(t);
+    const bool ends_band = t->part + 1 == t->parts.count;
+    int status = ends_band ? take_colours(t, t->banded + floats_above(t), NULL) : keep_before(t);
     if (!status)
         status = trip_context_note_stats(t);
     if (status)
         return status;
     t->before_stats = t->stats;
     end(t);
-    t->part++;
+    t->part = ends_band ? 0 : t->part + 1;
+    t->band += ends_band;
     status = plan(t);
+    if (!status)
+        status = take_before(t);
     return status ? status : start(t);
 }
 
@@ -627,7 +734,7 @@ int triptych_step(triptych *t, uint64_t deadline_ns)
     int status = check_drawing(t);
     if (!status)
         status = trip_frame_step(&t->drawing, deadline_ns);
-    while (status == TRIP_FRAME_DONE && t->part + 1 < t->parts.count) {
+    while (status == TRIP_FRAME_DONE && has_next(t)) {
         status = begin_next(t);
         status = status ? status : trip_frame_step(&t->drawing, deadline_ns);
     }
@@ -658,7 +765,7 @@ static int take_picture(triptych *t, float *rgba, float *depth)
                            depth ? "the frame was begun without distances"
                                  : "the frame has distances; use triptych_picture_and_depth()");
     if (!status)
-        status = take_colours(t, rgba, depth);
+        status = take_bands(t, rgba, depth);
     if (!status && t->settings.show == TRIP_SHOW_MERGE)
         draw_merge_map(t, rgba);
     if (!status && t->drawing.done)
@@ -683,6 +790,7 @@ void triptych_end(triptych *t)
     trip_scope *before = trip_scope_enter(&t->scope); /* keeps the error of the last call */
     end(t);
     keep_small_before(t);
+    drop_banded(t);
     trip_context_leave(before, 0);
 }
 

@@ -268,6 +268,7 @@ void triptych_destroy(triptych *t)
     triptych_close(t);
     trip_image_close(&t->files);
     pthread_mutex_destroy(&t->lock);
+    free(t->choices_folder);
     free(t);
 }
 
@@ -291,13 +292,16 @@ int triptych_open(triptych *t, const char *path, const triptych_resources *resou
     close_data(t);
     t->resources = wanted;
     t->name = strdup(wanted.name ? wanted.name : path);
+    free(t->choices_folder);
+    t->choices_folder = wanted.choices_folder ? strdup(wanted.choices_folder) : NULL;
+    t->choices_read = 0;
     status = t->name ? session_open_data(&t->session, path, wanted.memory_bytes)
                      : trip_fail(TRIP_ERROR, "render", path, "out of memory");
     t->open = status == 0;
     if (!t->open)
         close_data(t);
     t->session.input = t->name;
-    t->resources.name = NULL;
+    t->resources.name = t->resources.choices_folder = NULL;
     return trip_context_leave(before, status);
 }
 

@@ -15,6 +15,7 @@
 #include "lod_parts.h"
 #include "renderer_choice.h"
 #include "library_session.h"
+#include "quality_choice.h"
 #include "sheet_samples.h"
 #include "triptych.h"
 
@@ -57,24 +58,41 @@ struct triptych {
     unsigned level;       /* of at_level, otherwise 0 */
     trip_lod_parts parts; /* of the begun frame */
     int part;             /* index of the part that is drawn */
-    /* Picture of the parts before `part`, taken from the budget; otherwise NULL. */
+    /* Pictures of the parts before `part`, and one of several rays per pixel. They are taken from
+     * the budget. NULL if there are none. */
     float *before;
     /* Size of `before`, which may be kept for the next frame. */
     size_t before_bytes;
-    triptych_frame_stats before_stats; /* of the parts before `part` */
-    draw_settings given;               /* as set */
-    trip_settings settings;            /* of `given`; samples_per_sheet is 0 if the view selects */
-    double bytes_per_ms;               /* measured in bounded frames; 0 if none was drawn */
-    bool kernel_warned;                /* warned about the halo for the kernel */
-    bool levels_warned;                /* warned about missing levels for the classification */
-    bool light_noted;                  /* noted the light that was chosen for shadows */
-    double kelvin[2];                  /* of emission */
+    triptych_frame_stats before_stats; /* of the parts and bands before */
+    /* Bands of rows, drawn one after the other if the frame does not fit in memory at once. */
+    int band, bands, band_rows; /* rows of pixels of the frame; a multiple of the rays */
+    float *banded;              /* the picture of the bands before, from the budget; or NULL */
+    size_t banded_bytes;
+    draw_settings given;    /* as set */
+    trip_settings settings; /* of `given`; samples_per_sheet is 0 if the view selects */
+    double bytes_per_ms;    /* measured in bounded frames; 0 if none was drawn */
+    bool kernel_warned;     /* warned about the halo for the kernel */
+    bool levels_warned;     /* warned about missing levels for the classification */
+    bool light_noted;       /* noted the light that was chosen for shadows */
+    double kelvin[2];       /* of emission */
     /* Reason for the choice of TRIPTYCH_EFFECT_AUTO; NULL without it. */
     const char *why_effects;
     /* For shadows and occlusion. NULL if the last frames had neither. */
     trip_light_map *light;
     trip_emission *heat; /* NULL if no data set of heat is open */
     bool reader_counts;  /* `reader` was made for exact counts */
+
+    trip_choices choices;     /* of earlier frames */
+    uint64_t choices_read;    /* checksum of a data set: its stored choices were read; or 0 */
+    char *choices_folder;     /* keeps choices; NULL: none */
+    trip_choice choice;       /* of the begun frame */
+    const trip_choice *fixed; /* in the context of a trial: the choice; otherwise NULL */
+    int choice_step;          /* of the begun frame (quality_choice.h) */
+    double promise;           /* of the begun frame, of 255; 0: none is made */
+    bool choice_waits;        /* the begun frame has the defaults until triptych_choose() */
+    unsigned trials;          /* made by this context */
+    double trial_ms;          /* time of the trial for the begun frame; 0 without one */
+    char no_trial[512];       /* why the trial failed; empty if it did not */
 
     bool has_view;
     trip_camera_params view, turned;
@@ -143,6 +161,13 @@ int trip_context_choose_effects(triptych *t);
 int trip_context_begin_light(triptych *t);
 void trip_context_drop_light(triptych *t);
 void trip_context_drop_heat(triptych *t);
+/* Chooses samples, rays and levels for the planned frame, and sets them in drawn_settings
+ * (quality_choice.h). */
+int trip_context_choose_quality(triptych *t);
+/* Warns if the trial failed. A fault that ends the frame too is then reported only once. */
+void trip_context_note_quality(triptych *t);
+/* Prints the choice and its error. */
+void trip_context_explain_quality(const triptych *t, FILE *out);
 /* Prints one line per effect: whether it runs, and why. */
 void trip_context_explain_effects(const triptych *t, FILE *out);
 /* Records the statistics of the frame, once its picture is complete. */

@@ -183,6 +183,23 @@ int session_use_function(session *s, const session_look *look)
     return status;
 }
 
+void session_lend_function(session *to, const session *from)
+{
+    to->table = from->table;
+    to->draw_table = from->draw_table;
+    to->draw_map = from->draw_map;
+    to->draw = from->draw;
+    to->shading_range = from->shading_range;
+    for (int i = 0; i < LEVELS; i++)
+        to->classified[i].draw = &to->draw;
+}
+
+void session_return_function(session *s)
+{
+    s->table = s->draw_table = NULL;
+    s->draw_map = NULL;
+}
+
 /* Opens another data set, without drawing it yet. */
 static int open_part(session *s, const char *input)
 {

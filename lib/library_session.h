@@ -54,6 +54,11 @@ int session_load_function(const session *s, const session_look *look, trip_tf **
 /* Sets the transfer function for later frames. Reads the texts and allocates the table if needed.
  * Warns about visible values that bricking dropped, with the command that bricks again. */
 int session_use_function(session *s, const session_look *look);
+/* Lets a session use the transfer function of another session of the same data, which must outlive
+ * the use. */
+void session_lend_function(session *to, const session *from);
+/* Ends the use, before the session is closed. */
+void session_return_function(session *s);
 /* Returns the table of frames that interpolate values, or of frames that draw stored voxels. */
 const trip_tf_entry *session_table(const session *s, bool interpolates);
 /* Called between frames. Keeps the tables of coarse levels only if they are a small part of the

@@ -60,14 +60,14 @@ static double number_or(double given, double standard)
     return given == 0 ? standard : given == TRIPTYCH_ZERO ? 0 : given;
 }
 
-/* The number of samples per sheet; 0 lets the view select. */
+/* The number of samples per sheet, unless another one is chosen; 0 lets the view select. */
 static int samples_per_sheet(const draw_settings *s)
 {
     const int of_quality = s->all.quality == TRIPTYCH_QUALITY_DRAFT   ? 1
                            : s->all.quality == TRIPTYCH_QUALITY_HIGH  ? 8
                            : s->all.quality == TRIPTYCH_QUALITY_EXACT ? 16
                                                                       : 0;
-    return s->sheet.samples < 0 ? 0 : s->sheet.samples ? s->sheet.samples : of_quality;
+    return s->sheet.samples > 0 ? s->sheet.samples : of_quality;
 }
 
 static void set_light(trip_settings *out, const triptych_light *light)
@@ -114,12 +114,12 @@ trip_settings trip_settings_of(const draw_settings *s)
     out.kernel_radius = number_or(splat->kernel_radius, out.kernel_radius);
     for (int i = 0; i < 4; i++)
         out.background[i] = background[i];
-    out.lod_px = s->lod.voxel_px;
+    out.lod_px = fmax(s->lod.voxel_px, 0);
     out.max_bytes = s->lod.max_bytes;
     out.field = CHOSEN(trip_field_kind, s->integral.field);
     out.kernel = CHOSEN(trip_kernel, s->all.interpolation);
     out.tolerance = number_or(s->integral.tolerance, out.tolerance);
-    out.samples = s->all.samples ? s->all.samples : 1;
+    out.samples = s->all.samples > 0 ? s->all.samples : 1;
     out.show = CHOSEN(trip_show, s->all.show);
     out.effects = (trip_effects){
         .cueing = number_or(s->effects.cueing, DEFAULT_CUEING),

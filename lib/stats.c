@@ -48,16 +48,17 @@ static void explain_choices(const triptych *t, FILE *out)
     if (t->why_pre)
         fprintf(out, "default     pre instead of post: %s\n", t->why_pre);
     explain_parts(t, out);
+    trip_context_explain_quality(t, out);
     const bool nearest = t->drawn_settings.kernel == TRIP_KERNEL_NEAREST;
     if (t->nearest_chosen)
         fputs("default     nearest instead of linear interpolation: the values are labels\n", out);
     if (t->drawn_settings.classify == TRIP_CLASSIFY_POST && nearest)
         fputs("samples     one per voxel that a ray meets, as always with the nearest value\n",
               out);
-    else if (t->drawn_settings.classify == TRIP_CLASSIFY_POST && !t->settings.samples_per_sheet)
+    else if (t->drawn_settings.classify == TRIP_CLASSIFY_POST && !t->choice.samples_per_sheet)
         fprintf(out, "samples     %d per sheet, by the view: voxels are up to %.3g %s wide\n",
                 t->samples_per_sheet.samples_per_sheet, t->samples_per_sheet.voxel_px,
-                t->settings.samples > 1 ? "samples" : "px");
+                t->choice.rays > 1 ? "samples" : "px");
 }
 
 int triptych_explain(triptych *t, char **text)
@@ -146,6 +147,13 @@ static triptych_frame_stats frame_stats(const triptych *t)
         .samples_per_sheet = t->drawn_settings.classify == TRIP_CLASSIFY_POST
                                  ? t->drawn_settings.samples_per_sheet
                                  : 0,
+        .rays = trip_context_draws_values(t) && t->plan.gathers ? 0 : t->choice.rays,
+        .lod_px = t->drawn_settings.lod_px,
+        .expected_error = t->promise > 0 && !t->choice_waits ? t->choice.error : -1,
+        .promised_error = t->promise,
+        .trial_ms = t->trial_ms,
+        .trials = t->trials,
+        .choice_waits = t->choice_waits,
         .interpolation = trip_context_draws_values(t)
                              ? (triptych_interpolation)(t->drawn_settings.kernel + 1)
                              : TRIPTYCH_INTERPOLATION_DEFAULT,
@@ -226,6 +234,17 @@ static bool is_of_part_before(const triptych *t, unsigned i)
     return false;
 }
 
+/* Records the statistics of a list. Later bands add their reads. */
+static void note_list(triptych *t, unsigned i)
+{
+    const triptych_list_stats before = t->list_stats[i];
+    t->list_stats[i] = list_stats(t, i);
+    if (t->band == 0)
+        return;
+    t->list_stats[i].splats_read += before.splats_read;
+    t->list_stats[i].bytes_read += before.bytes_read;
+}
+
 int trip_context_note_stats(triptych *t)
 {
     unsigned count = t->session.data->list_count;
@@ -237,13 +256,14 @@ int trip_context_note_stats(triptych *t)
     t->stats = frame_stats(t);
     snprintf(t->device, sizeof t->device, "%s", t->stats.device);
     t->stats.device = t->device;
-    if (t->part > 0)
+    if (t->part > 0 || t->band > 0)
         add_stats(&t->stats, &t->before_stats);
     for (unsigned i = 0; i < count; i++)
         if (!is_of_part_before(t, i))
-            t->list_stats[i] = list_stats(t, i);
+            note_list(t, i);
     t->has_stats = true;
     note_rate(t);
+    trip_context_note_quality(t);
     return 0;
 }
 

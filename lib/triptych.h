@@ -130,6 +130,12 @@ typedef struct triptych_resources {
     /* If not 0, bricks behind opaque matter are read too. The picture does not change. */
     int read_occluded;
     const char *name; /* names the data in messages; default: the path of the data set */
+    /* An existing folder that keeps the choices of triptych_quality for later contexts, in small
+     * files NAME.quality. Default: they are kept in the context only. */
+    const char *choices_folder;
+    /* If not 0, triptych_begin() makes no trial. A frame without a known choice has the defaults of
+     * its quality, and triptych_choose() makes the choice. */
+    int choose_later;
 } triptych_resources;
 
 /* Closes the open data set, if any, and opens the data set at `path`. NULL for `resources` selects
@@ -292,14 +298,21 @@ typedef struct triptych_conversion {
  * free(). *text is NULL after a failure. */
 TRIPTYCH_API int triptych_convert(triptych *t, const triptych_conversion *wanted, char **text);
 
-/* Trades closeness to the integral for time; docs/quality.md has the figures. triptych-accuracy(1)
- * has the errors, measured by `triptych accuracy`. */
+/* A promise of the mean error of post, over the pixels that the object covers. The truth is the
+ * integral's mean over the area of each pixel. The library chooses the samples per sheet, the rays
+ * per pixel and the levels of detail that are not given. A trial on small pictures finds the
+ * cheapest numbers that keep the promise. The numbers depend on the data, the transfer function,
+ * the settings and the width of a voxel in pixels, in steps of half an octave. They do not depend
+ * on time, threads or memory. If voxels are at least a pixel wide, and one ray per pixel at the
+ * finest level keeps the promise of normal, no other numbers are chosen. */
 typedef enum triptych_quality {
     TRIPTYCH_QUALITY_DEFAULT, /* normal */
-    TRIPTYCH_QUALITY_DRAFT,   /* post, with 1 sample per sheet */
-    TRIPTYCH_QUALITY_NORMAL,  /* the defaults of all other settings */
-    TRIPTYCH_QUALITY_HIGH,    /* post, with 8 samples per sheet */
-    TRIPTYCH_QUALITY_EXACT,   /* post, with 16 samples per sheet and early termination at 1/8192 */
+    TRIPTYCH_QUALITY_DRAFT,   /* post, 4 of 255 */
+    TRIPTYCH_QUALITY_NORMAL,  /* 1 of 255 */
+    TRIPTYCH_QUALITY_HIGH,    /* post, 0.3 of 255 */
+    /* Post at the finest level, without a trial. It has 16 samples per sheet, and two rays or more
+     * along each side of a pixel and of a voxel. Early termination is at 1/8192. */
+    TRIPTYCH_QUALITY_EXACT,
 } triptych_quality;
 
 /* The order of classification and interpolation. */
@@ -443,8 +456,8 @@ typedef struct triptych_splat_settings {
 
 /* Settings of sheets of interpolated values (post). */
 typedef struct triptych_sheet_settings {
-    /* Samples per sheet, 1 to 16. More samples come closer to the integral. By default the view
-     * selects 2 to 6, unless the quality selects a number. -1 always lets the view select. */
+    /* Samples per sheet, 1 to 16. More samples come closer to the integral. By default (0 or -1)
+     * they are chosen by the quality. Without a trial, the view selects 2 to 6. */
     int samples;
 } triptych_sheet_settings;
 
@@ -467,7 +480,8 @@ typedef struct triptych_integral_settings {
  * (triptych_levels_for); without them a warning says so. 0 sets no bound. */
 typedef struct triptych_lod_settings {
     /* Each part of the picture is drawn at the coarsest level with voxels at most this many pixels
-     * wide, up to 1000. 0 draws the finest level only. */
+     * wide, up to 1000. TRIPTYCH_ZERO draws the finest level only. By default (0 or -2), post
+     * chooses by the quality, and pre draws the finest level. */
     double voxel_px;
     /* Bounds the bytes of codes and normals in view. The parts that are widest in the picture get
      * the finest levels first. Positions are not counted; they add 10 to 30 %. Never finer than
@@ -551,9 +565,9 @@ typedef struct triptych_settings {
      * to 0.1. No component of a pixel changes by more than this number. The default is 1/8192 for
      * pre and 1/512 for post. GL uses at most the default in pre. */
     double early_termination;
-    /* Rays along each side of a pixel, 1 to 64. The integral takes the mean over the area of each
-     * pixel by default. The default of the other renderers is 1. They draw a picture this many
-     * times wider and higher, and average it. Above 1 not with depth. */
+    /* Rays along each side of a pixel, 1 to 64. By default (0 or -1), the integral takes the mean
+     * over the area of each pixel, and post chooses by the quality. Pre takes 1. Renderers draw a
+     * picture this many times wider and higher, and average it. Above 1 not with depth. */
     int samples;
     /* If not 0, colours are divided by the accumulated opacity, and every covered pixel becomes
      * opaque. */
@@ -691,6 +705,11 @@ TRIPTYCH_API void triptych_end(triptych *t);
  * within milliseconds, and so do further calls for a frame that is begun. */
 TRIPTYCH_API void triptych_cancel(triptych *t);
 
+/* Chooses the samples, rays and levels of the next frame, as triptych_begin() does without
+ * triptych_resources.choose_later. Makes a trial if the choice is not known. Fails with
+ * TRIPTYCH_USAGE while a frame is begun. */
+TRIPTYCH_API int triptych_choose(triptych *t);
+
 /* ---- costs of a frame ---- */
 
 /* Explains the frame that is begun: which bricks, lists and planes it reads, and why, one effect or
@@ -735,6 +754,14 @@ typedef struct triptych_frame_stats {
     /* 1 if the integrals of the transfer function have a closed form, so that no table was looked
      * up (post). */
     int closed_form;
+    int rays;      /* along each side of a pixel; 0 with the mean over its area */
+    double lod_px; /* voxels of coarse levels were at most this wide; 0: the finest level */
+    /* Mean error by the trial, of 255, and the promise of the quality. The error is -1 if no trial
+     * was made, and the promise 0 if the quality makes none. */
+    double expected_error, promised_error;
+    double trial_ms;  /* of the trial for this frame, not in `ms`; 0 if the choice was known */
+    unsigned trials;  /* made by this context */
+    int choice_waits; /* 1 if the frame has the defaults until triptych_choose() */
 } triptych_frame_stats;
 
 /* Returns the statistics of the last complete frame. Fails with TRIPTYCH_USAGE if there is none. */

@@ -28,6 +28,8 @@ typedef struct trip_list_stats {
     uint64_t bytes_read;
 } trip_list_stats;
 
+enum { TRIP_FRAME_ROWS = 32 };
+
 /* The inputs of a frame; they must outlive it. */
 typedef struct trip_frame {
     const trip_dataset *data;
@@ -41,7 +43,11 @@ typedef struct trip_frame {
      * for the integral renderer. */
     struct trip_light_map *light;
     struct trip_emission *emission; /* begun, in frames with that effect; else NULL */
-    bool count;                     /* also count projected and drawn splats, which takes time */
+    /* The rows of the picture to draw, if `rows` is not 0: for values and the CPU renderer only.
+     * Both are multiples of TRIP_FRAME_ROWS, except at the end of the picture. Pixels have the same
+     * bits as in the whole picture. */
+    int first_row, rows;
+    bool count; /* also count projected and drawn splats, which takes time */
     /* Called between batches with the stage "draw" and the number of splats. The integral renderer
      * calls it with "integrate" and the number of pixels. May be NULL. */
     void (*progress)(void *user, const char *stage, uint64_t done, uint64_t total);

@@ -61,8 +61,7 @@
  * them (deviation.h). The deviation codes d are interpolated like the codes, and kept within 0 and
  * 255. A segment has the mean d of the two samples at its planes, wherever it is cut. Blurred by
  * this deviation, k and k q replace k and k q in the formulas above (blurred_function.h). So thin
- * or noisy matter keeps its mean extinction. Voxels without a deviation have d = 0. gl does not
- * read deviations yet.
+ * or noisy matter keeps its mean extinction. Voxels without a deviation have d = 0.
  *
  * The mean of the voxels' opacities along a ray is smaller than the opacity of their mean
  * extinction. The formula therefore suits matter that is thin in a coarse voxel's length, and

@@ -14,6 +14,7 @@ typedef struct trip_serve_params {
     unsigned threads;
     triptych_renderer renderer;
     triptych_engine engine;
+    const char *choices_folder; /* as in triptych_resources */
     const char *function;
     const char *heat; /* heat data set; may be NULL */
     draw_settings settings;

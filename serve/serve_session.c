@@ -99,6 +99,7 @@ trip_session *trip_session_start(const trip_serve_params *p)
                                                          .renderer = p->renderer,
                                                          .engine = p->engine,
                                                          .frames_per_second = p->frames_per_second,
+                                                         .choices_folder = p->choices_folder,
                                                          .find = p->find,
                                                          .release = p->release,
                                                          .user = p->find_user,

@@ -2,11 +2,12 @@
 // In: two codes and the sums of the transfer function. Out: colour and extinction.
 // Mirrors trip_segment_of() in render/classification/segments.c. All terms of a sum have the same sign, and
 // differences of the integrals between whole codes are exact. With CLOSED it mirrors
-// render/classification/closed_form.h. With EXACT the codes may lie beyond the ends of the function,
+// render/classification/closed_form.h. With BEYOND the codes may lie beyond the ends of the function,
 // where it is constant.
 #include "shared.h"
 
-#ifdef EXACT
+#if defined(EXACT) || defined(WIDE)
+#define BEYOND
 #define segment_between segment_within
 #endif
 #ifdef CLOSED
@@ -89,7 +90,7 @@ vec4 segment_between(float a, float b, float unit)
 
 #endif
 
-#ifdef EXACT
+#ifdef BEYOND
 #undef segment_between
 
 vec4 weighed(vec4 colour, float weight)

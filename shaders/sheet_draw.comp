@@ -1,9 +1,10 @@
 // Draws segments between sheets into a band of a layer, front to back, with one invocation for each
 // pixel (render/sheet.h).
-// In: codes and gradients of the sheets, segment ends in draw order. In and out: the layer, and
-// with DEPTH its depths (render/layer.h).
+// In: codes and gradients of the sheets, with BLURRED their deviations, segment ends in draw order.
+// In and out: the layer, and with DEPTH its depths (render/layer.h).
 // Mirrors render/reference/reference_sheets.c.
 #include "segments.glsl"
+#include "blurred.glsl"
 #include "effects.glsl"
 #include "shade.glsl"
 #include "opacity.glsl"
@@ -30,6 +31,9 @@ layout(rgba32f, binding = TRIP_GL_IMAGE_DEPTH) uniform image2D layer_depths;
 #endif
 #ifdef SHADED
 layout(binding = TRIP_GL_SHEET_GRADIENTS) uniform sampler2DArray gradients;
+#endif
+#ifdef BLURRED
+layout(binding = TRIP_GL_SHEET_DEVIATIONS) uniform sampler2DArray deviations;
 #endif
 #ifdef UNEVEN
 // The positions of voxels along u, then along v: whole part and rest.
@@ -60,6 +64,9 @@ struct position {
     vec2 part; // fraction within the cell
     bool there; // all voxels of the cell are present
     float code;
+#ifdef BLURRED
+    float deviation; // divided by 255
+#endif
 #ifdef NEAREST
     // Where the ray crosses the plane: whole part and rest. nearest_between() sets the voxel.
     ivec2 base;
@@ -179,6 +186,40 @@ float wide_code(position at, trip_gl_sheet_end end, float corner)
     }
     return corner + sum;
 }
+
+#ifdef BLURRED
+float wide_deviation(position at, trip_gl_sheet_end end)
+{
+    vec4 weights[3] = vec4[3](kernel_weights(at.part.x), kernel_weights(at.part.y), kernel_weights(end.part));
+    float sum = 0.0;
+    for (int n = 0; n < 64; n++) {
+        tap t = tap_of(at, end, weights, n);
+        sum += t.weight * texelFetch(deviations, t.at, 0).r;
+    }
+    return clamp(sum, 0.0, 1.0);
+}
+#endif
+#endif
+
+#ifdef BLURRED
+float sheet_deviation(position at, int sheet)
+{
+    vec2 middle = vec2(at.cell + 1) / vec2(textureSize(deviations, 0).xy);
+    return dot(corner_weights(at.part), textureGather(deviations, vec3(middle, sheet)));
+}
+
+// Interpolates the deviation of a sample. All corners of its cell are present.
+float deviation_of(position at, trip_gl_sheet_end end)
+{
+#ifdef WIDE
+    return wide_deviation(at, end);
+#else
+    float before = sheet_deviation(at, end.part < 1.0 ? end.before : end.behind);
+    if (end.part > 0.0 && end.part < 1.0)
+        return mix(before, sheet_deviation(at, end.behind), end.part);
+    return before;
+#endif
+}
 #endif
 
 #ifdef UNEVEN
@@ -235,6 +276,9 @@ void place(ivec2 base, vec2 p, inout position at)
 #endif
     at.there = false;
     at.code = 0.0;
+#ifdef BLURRED
+    at.deviation = 0.0;
+#endif
 }
 
 bool is_within(ivec2 cell)
@@ -279,6 +323,10 @@ position position_at(ray r, trip_gl_sheet_end end)
     at.there = all(greaterThanEqual(min(before, behind), vec4(NO_CODE)));
     vec4 weights = corner_weights(at.part);
     at.code = before.x + mix(dot(weights, before - before.x), dot(weights, behind - before.x), end.part);
+#endif
+#ifdef BLURRED
+    if (at.there)
+        at.deviation = deviation_of(at, end);
 #endif
     return at;
 }
@@ -455,8 +503,13 @@ void add_part(ray r, trip_gl_sheet_end from, trip_gl_sheet_end to, position a, p
     a.code = b.code = middle_at.code;
     a.voxel = b.voxel = middle_at.voxel;
 #endif
-    vec4 medium = segment_between(first > 0.0 ? mix(a.code, b.code, first) : a.code,
-                                  last < 1.0 ? mix(a.code, b.code, last) : b.code, across_u.w);
+    float code_a = first > 0.0 ? mix(a.code, b.code, first) : a.code;
+    float code_b = last < 1.0 ? mix(a.code, b.code, last) : b.code;
+#ifdef BLURRED
+    vec4 medium = blurred_between(code_a, code_b, 0.5 * (a.deviation + b.deviation), across_u.w);
+#else
+    vec4 medium = segment_between(code_a, code_b, across_u.w);
+#endif
     if (!(medium.a > 0.0))
         return;
     vec3 colour = debug_colour.w > 0.0 ? vec3(debug_colour.xyz) : medium.rgb;

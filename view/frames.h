@@ -2,8 +2,10 @@
  * window. The window's thread posts the wanted view and takes the latest picture; it never waits.
  * The latest view replaces earlier ones. A frame in progress is finished if it is quick, and
  * abandoned otherwise. For a new view it first draws a frame as small and coarse as the frame time
- * needs. The full picture follows, with the same bits as `triptych render`'s. The window's thread
- * calls these functions; the callbacks of trip_frames_params run on the drawing thread. */
+ * needs. The full picture follows, with the same bits as `triptych render`'s. If the choice of its
+ * quality is not known, it is first drawn with the defaults, and the trial comes after it. The
+ * window's thread calls these functions; the callbacks of trip_frames_params run on the drawing
+ * thread. */
 #ifndef TRIP_VIEW_FRAMES_H
 #define TRIP_VIEW_FRAMES_H
 
@@ -24,7 +26,8 @@ typedef struct trip_frames_params {
     unsigned threads;
     triptych_renderer renderer;
     triptych_engine engine;
-    double frames_per_second; /* while the view moves; 0 means 30 */
+    double frames_per_second;   /* while the view moves; 0 means 30 */
+    const char *choices_folder; /* as in triptych_resources; stays valid */
     /* Called by the drawing thread when there is something new to show. */
     void (*wake)(void *user);
     void *wake_user;

@@ -57,6 +57,7 @@ struct trip_frames {
     int width, height;
     uint8_t *shown;             /* pixels of `picture` */
     trip_pace pace, whole_pace; /* of moving frames; of full pictures */
+    bool awaits_choice;         /* the full picture has the defaults until triptych_choose() */
     bool whole;                 /* rgba is the full picture of the wanted view */
     double shown_ms;            /* time of the last shown picture */
 };

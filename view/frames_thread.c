@@ -203,6 +203,8 @@ static int open_data(trip_frames *f)
                                                       .renderer = p->renderer,
                                                       .engine = p->engine,
                                                       .keep_pages = !f->frugal,
+                                                      .choices_folder = p->choices_folder,
+                                                      .choose_later = 1,
                                                       .name = w->input });
     if (!status && w->heat)
         status = open_heat(f);
@@ -407,6 +409,7 @@ static void show(trip_frames *f, int width, int height, bool whole)
 typedef struct frame {
     int width, height;
     bool whole; /* full size and detail */
+    bool final; /* and with the samples and rays that the quality needs */
     draw_settings settings;
     double detail; /* share of the width and height that has voxels of its own */
     bool first;    /* first picture of this view: shown in parts, and always finished */
@@ -497,9 +500,16 @@ static void note_frame(trip_frames *f, const frame *d, double ms)
         s->stats = stats;
         s->stats.renderer = s->stats.device = s->stats.engine = s->stats.ring = NULL;
     }
-    s->exact = d->whole && f->wanted_count == f->taken;
+    s->exact = d->final && f->wanted_count == f->taken;
     s->failed = false;
     pthread_mutex_unlock(&f->lock);
+}
+
+/* Returns whether the last frame has the defaults, because its choice is not known. */
+static bool awaits_choice(trip_frames *f)
+{
+    triptych_frame_stats stats;
+    return triptych_get_frame_stats(f->t, &stats) == 0 && stats.choice_waits;
 }
 
 static int draw(trip_frames *f, double scale, double detail, const draw_settings *settings,
@@ -529,8 +539,10 @@ static int draw(trip_frames *f, double scale, double detail, const draw_settings
     set_ends_early(f, false);
     if (status)
         return status;
-    show(f, d.width, d.height, d.whole);
-    f->whole = d.whole;
+    d.final = d.whole && !awaits_choice(f);
+    show(f, d.width, d.height, d.final);
+    f->whole = d.final;
+    f->awaits_choice = d.whole && !d.final;
     note_frame(f, &d, trip_now_ms() - d.begun_ms);
     wake(f);
     return 0;
@@ -545,6 +557,8 @@ static int draw_moving(trip_frames *f, double target_ms)
     draw_settings settings = with_levels(f, MOVING_LOD_PX * scale / detail, MOVING_MAX * target_ms);
     if (settings.sheet.samples <= 0 && draw_settings_may_use_sheets(&settings))
         settings.sheet.samples = MOVING_SAMPLES;
+    if (settings.all.samples <= 0)
+        settings.all.samples = 1;
     return draw(f, scale, detail, &settings, true);
 }
 
@@ -557,16 +571,30 @@ static int draw_coarse(trip_frames *f, double whole_ms)
     return draw(f, 1, 1, &settings, false);
 }
 
+/* Makes the trial for the picture that is shown, and draws the picture again. A new wish ends the
+ * trial. */
+static int draw_chosen(trip_frames *f)
+{
+    if (!f->awaits_choice || has_newer(f))
+        return 0;
+    show_stage(f, "trial", 0);
+    set_ends_early(f, true);
+    int status = triptych_choose(f->t);
+    set_ends_early(f, false);
+    return status ? status : draw(f, 1, 1, &f->now.settings, false);
+}
+
 /* Draws a picture at once, then the full one. If the full one takes long, draws a coarse one of
  * full size between them. */
-static int draw_wanted(trip_frames *f)
+static int draw_whole(trip_frames *f)
 {
     enum { LONG_MS = 1500 };
     const draw_settings *whole = &f->now.settings;
     const double wanted = f->params.frames_per_second;
     const double target_ms = 1000 / (wanted > 0 ? wanted : DEFAULT_FPS);
     const double whole_ms = trip_pace_expect_ms(&f->whole_pace, wanted_pixels(f));
-    if (whole_ms > 0 && whole_ms < target_ms)
+    /* the memory of a small frame could be too much beside a full one */
+    if (f->plain || (whole_ms > 0 && whole_ms < target_ms))
         return draw(f, 1, 1, whole, true);
     int status = draw_moving(f, target_ms);
     if (!status && !f->whole && whole_ms > LONG_MS && !has_newer(f))
@@ -574,6 +602,13 @@ static int draw_wanted(trip_frames *f)
     if (!status && !f->whole && !has_newer(f))
         status = draw(f, 1, 1, whole, false);
     return status;
+}
+
+static int draw_wanted(trip_frames *f)
+{
+    f->awaits_choice = false;
+    int status = draw_whole(f);
+    return status ? status : draw_chosen(f);
 }
 
 static int prepare(trip_frames *f)

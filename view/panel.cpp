@@ -550,10 +550,19 @@ bool draw_quality(trip_panel *p, trip_document *d)
             ImGui::SliderInt("Samples per sheet", &samples, 0, 16, samples ? "%d" : "automatic"));
         s->sheet.samples = samples;
     }
-    changed |= slide(p, "Level of detail", &s->lod.voxel_px, 0, 8, "%.1f px");
-    int samples = s->all.samples ? s->all.samples : 1;
-    changed |= mark_beside(p, "Antialiasing", ImGui::SliderInt("Antialiasing", &samples, 1, 4));
-    s->all.samples = samples > 1 ? samples : 0;
+    // The leftmost position is automatic. 0 px stands for the finest level.
+    double lod = s->lod.voxel_px == TRIPTYCH_ZERO ? 0
+                 : s->lod.voxel_px > 0            ? s->lod.voxel_px
+                                                  : -0.1;
+    if (slide(p, "Level of detail", &lod, -0.1, 8, lod < 0 ? "automatic" : "%.1f px")) {
+        s->lod.voxel_px = lod < -0.05 ? 0 : lod < 0.05 ? TRIPTYCH_ZERO : lod;
+        changed = true;
+    }
+    int rays = s->all.samples > 0 ? s->all.samples : 0;
+    changed |=
+        mark_beside(p, "Antialiasing",
+                    ImGui::SliderInt("Antialiasing", &rays, 0, 4, rays ? "%d" : "automatic"));
+    s->all.samples = rays;
     return changed;
 }
 

@@ -20,7 +20,8 @@ typedef struct trip_view_params {
     unsigned threads;
     triptych_renderer renderer;
     triptych_engine engine;
-    triptych_view start; /* first view of each data set; its pointers stay valid */
+    const char *choices_folder; /* as in triptych_resources */
+    triptych_view start;        /* first view of each data set; its pointers stay valid */
     const char *function;
     const char *heat; /* heat data set of the inputs; may be NULL */
     double opacity_scale;

@@ -476,6 +476,7 @@ static int start_frames(window *w)
         .renderer = p->renderer,
         .engine = p->engine,
         .frames_per_second = p->frames_per_second,
+        .choices_folder = p->choices_folder,
         .wake = wake,
         .wake_user = w,
         .find = p->find,

@@ -255,7 +255,8 @@ static int begin_frame(trip_renderer *base, const trip_frame *frame)
         release_buffers(r);
     int status = check_kernels(frame);
     if (!status)
-        status = trip_cpu_fit_panes(r, frame->camera->width, frame->camera->height);
+        status = trip_cpu_fit_panes(r, frame->camera->width, frame->first_row,
+                                    frame->rows ? frame->rows : frame->camera->height);
     if (!status)
         status = fit_buffers(r);
     if (!status)

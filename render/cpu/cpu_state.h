@@ -110,7 +110,7 @@ static inline int trip_cpu_pane_x(const trip_cpu *r, uint32_t pane)
 
 static inline int trip_cpu_pane_y(const trip_cpu *r, uint32_t pane)
 {
-    return (int)(pane / r->mask.grid.across) * TRIP_CPU_PANE;
+    return (int)(pane / r->mask.grid.across + r->mask.grid.first) * TRIP_CPU_PANE;
 }
 
 static inline size_t trip_cpu_pane_floats(const trip_cpu *r)

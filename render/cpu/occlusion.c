@@ -76,14 +76,17 @@ static trip_cpu_occlusion occlusion_of(const trip_cpu_mask *mask, trip_pixels px
     bool open = false, terminated = false;
     if (px.first > px.last || py.first > py.last)
         return TRIP_CPU_OCCLUDED;
-    for (int ty = y.first / TEXELS; ty <= y.last / TEXELS; ty++)
+    const int rows[2] = { (int)mask->grid.first, (int)(mask->grid.first + mask->grid.down) - 1 };
+    const int top = y.first / TEXELS, bottom = y.last / TEXELS;
+    for (int ty = top > rows[0] ? top : rows[0]; ty <= bottom && ty <= rows[1]; ty++)
         for (int tx = x.first / TEXELS; tx <= x.last / TEXELS; tx++) {
             trip_pixels h = in_pane(x, tx), v = in_pane(y, ty);
             uint64_t bits = bits_of(h.first, h.last, v.first, v.last);
             uint64_t rest =
                 bits &
-                atomic_load_explicit(&mask->panes[(uint32_t)ty * mask->grid.across + (uint32_t)tx],
-                                     memory_order_relaxed);
+                atomic_load_explicit(
+                    &mask->panes[(uint32_t)(ty - rows[0]) * mask->grid.across + (uint32_t)tx],
+                    memory_order_relaxed);
             open |= rest != 0;
             terminated |= rest != bits;
             if (open && terminated)

@@ -8,9 +8,9 @@
 
 #include "cpu/kernels/kernels.h"
 
-/* Number of panes across the image and down. */
+/* Number of panes across the image and down. `first` panes lie above the drawn rows. */
 typedef struct trip_cpu_grid {
-    uint32_t across, down;
+    uint32_t across, down, first;
 } trip_cpu_grid;
 
 /* An occlusion map with one bit for each texel of 4 x 4 pixels. The bit is 1 if a pixel is open and

@@ -36,17 +36,21 @@ void trip_cpu_release_panes(trip_cpu *r)
     trip_budget_release(r->budget, r->pixels, r->panes_bytes);
     r->pixels = r->open_sheets = NULL;
     r->panes_bytes = 0;
-    r->mask.grid = (trip_cpu_grid){ 0, 0 };
+    r->mask.grid = (trip_cpu_grid){ 0, 0, 0 };
 }
 
-int trip_cpu_fit_panes(trip_cpu *r, int width, int height)
+int trip_cpu_fit_panes(trip_cpu *r, int width, int first_row, int rows)
 {
+    static_assert(TRIP_FRAME_ROWS == TRIP_CPU_PANE, "rows of a frame are rows of panes");
     bool sums = trip_settings_sum_sheets(r->frame->settings);
     trip_cpu_grid grid = { ((uint32_t)width + TRIP_CPU_PANE - 1) / TRIP_CPU_PANE,
-                           ((uint32_t)height + TRIP_CPU_PANE - 1) / TRIP_CPU_PANE };
+                           ((uint32_t)rows + TRIP_CPU_PANE - 1) / TRIP_CPU_PANE,
+                           (uint32_t)first_row / TRIP_CPU_PANE };
     if (grid.across == r->mask.grid.across && grid.down == r->mask.grid.down &&
-        r->channels == r->kernels->channels && r->has_open_sheets == sums)
+        r->channels == r->kernels->channels && r->has_open_sheets == sums) {
+        r->mask.grid.first = grid.first;
         return 0;
+    }
     trip_cpu_release_panes(r);
     r->mask.grid = grid;
     r->channels = r->kernels->channels;
@@ -59,7 +63,7 @@ int trip_cpu_fit_panes(trip_cpu *r, int width, int height)
         memory = trip_budget_take(r->budget, bytes);
     }
     if (!memory) {
-        r->mask.grid = (trip_cpu_grid){ 0, 0 };
+        r->mask.grid = (trip_cpu_grid){ 0, 0, 0 };
         return trip_fail(TRIP_ERROR, "render", "CPU renderer",
                          "%zu bytes of pixels do not fit the memory given; raise --memory to more "
                          "than %llu MiB or draw a smaller image",
@@ -331,7 +335,8 @@ void trip_cpu_merge_layer(trip_cpu *r)
 void trip_cpu_finish_picture(trip_cpu *r, float *rgba, float *depth)
 {
     trip_cpu_finish_blending(r);
-    r->rgba = rgba;
+    /* kernels count rows from the top of the whole picture */
+    r->rgba = rgba - (size_t)r->frame->first_row * (size_t)r->frame->camera->width * 4;
     r->depth = depth;
     for_each_row(r, finish_row);
 }

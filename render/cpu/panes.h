@@ -6,7 +6,7 @@
 #include "cpu/cpu_state.h"
 
 /* Takes memory for the frame's panes. Fails with TRIP_ERROR if the budget has too little left. */
-int trip_cpu_fit_panes(trip_cpu *r, int width, int height);
+int trip_cpu_fit_panes(trip_cpu *r, int width, int first_row, int rows);
 void trip_cpu_release_panes(trip_cpu *r);
 
 /* Empties all panes at the start of a frame. */

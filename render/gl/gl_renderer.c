@@ -694,6 +694,7 @@ static const trip_renderer_ops gl_ops = {
     .name = "gl",
     .classifies_post = true,
     .closed_forms = true,
+    .blurs = true,
     .effects = 1u << TRIP_CLASSIFY_PRE | 1u << TRIP_CLASSIFY_POST,
     .forms = TRIP_DRAWS_FIXED,
     .destroy = destroy,
@@ -763,7 +764,7 @@ static void set_up_sheets(gl_renderer *r)
     s->target = &r->target;
     r->sums.variants = &r->variants;
     r->sums.target = &r->target;
-    s->textures.budget = s->function.budget = s->positions.budget = r->budget;
+    s->textures.budget = s->function.budget = s->positions.budget = s->blur.budget = r->budget;
     r->positions.budget = r->budget;
 }
 

@@ -3,6 +3,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "brick_ranges.h"
 #include "field.h"
 #include "gl/frame_block.h"
 #include "report.h"
@@ -31,6 +32,7 @@ static unsigned effects_of(const trip_frame *frame)
            trip_gl_frame_placed(s) |
            (trip_coordinates_uneven(&frame->data->coordinates) ? TRIP_GL_UNEVEN : 0) |
            (frame->plan->not_closed ? 0 : TRIP_GL_CLOSED) |
+           (frame->plan->blurs ? TRIP_GL_BLURRED : 0) |
            (frame->plan->draw.of_stored ? TRIP_GL_EXACT : 0);
 }
 
@@ -40,6 +42,20 @@ static void forget(trip_gl_sheets *s)
     s->count = s->front = 0;
     s->batch = (trip_gl_sheet_batch){ 0 };
     s->drawing = (trip_gl_sheet_drawing){ 0 };
+}
+
+static int set_function(trip_gl_sheets *s, const trip_frame *frame)
+{
+    const trip_plan *plan = frame->plan;
+    const double voxel_world = frame->camera->voxel_world;
+    if (!plan->blurs)
+        trip_gl_sheet_blur_rest(&s->blur);
+    int status =
+        trip_gl_sheet_tf_set(&s->function, frame->table, plan->not_closed ? NULL : &plan->closed,
+                             &plan->draw, voxel_world);
+    if (!status && plan->blurs)
+        status = trip_gl_sheet_blur_set(&s->blur, frame->table, &plan->draw, voxel_world);
+    return status;
 }
 
 int trip_gl_sheets_begin_frame(trip_gl_sheets *s, const trip_frame *frame)
@@ -56,15 +72,14 @@ int trip_gl_sheets_begin_frame(trip_gl_sheets *s, const trip_frame *frame)
         glNamedBufferStorage(s->ends_block, TRIP_GL_ENDS_MAX * sizeof(trip_gl_sheet_end), NULL,
                              GL_DYNAMIC_STORAGE_BIT);
     }
-    return trip_gl_sheet_tf_set(&s->function, frame->table,
-                                frame->plan->not_closed ? NULL : &frame->plan->closed,
-                                &frame->plan->draw, frame->camera->voxel_world);
+    return set_function(s, frame);
 }
 
 void trip_gl_sheets_release(trip_gl_sheets *s)
 {
     trip_gl_sheet_textures_release(&s->textures);
     trip_gl_sheet_tf_release(&s->function);
+    trip_gl_sheet_blur_release(&s->blur);
     trip_gl_sheet_positions_release(&s->positions);
     glDeleteBuffers(1, &s->pass_block);
     glDeleteBuffers(1, &s->ends_block);
@@ -115,8 +130,9 @@ int trip_gl_sheets_begin_layer(trip_gl_sheets *s, int axis)
     find_extent(s);
     /* An interval needs the sheets around it on both sides, and one before it may still be held. */
     const unsigned min = 2 * (unsigned)sheets_about(s->frame->settings) + 1;
-    int status = trip_gl_sheet_textures_fit(&s->textures, s->size[0], s->size[1], min,
-                                            s->frame->settings->shading);
+    int status =
+        trip_gl_sheet_textures_fit(&s->textures, s->size[0], s->size[1], min,
+                                   s->frame->settings->shading, s->effects & TRIP_GL_BLURRED);
     if (!status && s->effects & TRIP_GL_UNEVEN)
         status =
             trip_gl_sheet_positions_set(&s->positions, s->coordinates, axis, s->first, s->size);
@@ -157,13 +173,21 @@ static void corner_of(uint32_t number, uint32_t at[2])
     at[1] = 8 * trip_morton_even(number >> 1);
 }
 
-/* Fills the squares of a run with codes at offset `codes` of the slot's codes. Returns their
- * number. */
+/* Returns the bytes of the deviations of a run that the frame reads. */
+static size_t deviation_bytes(const trip_gl_sheets *s, const trip_block *block)
+{
+    return s->effects & TRIP_GL_BLURRED && block->deviations ? block->count : 0;
+}
+
+/* Fills the squares of a run with codes at offset `codes` of the slot's codes. Deviations follow
+ * the codes. Returns the number of squares. */
 static uint32_t fill_squares(const trip_gl_sheets *s, const trip_run *run, const trip_block *block,
                              size_t codes, struct trip_gl_sheet_square *out)
 {
     trip_square squares[TRIP_BLOCK_SQUARES_MAX];
     const uint32_t count = trip_block_squares(block, squares);
+    const size_t deviations = codes + trip_block_codes_bytes(block);
+    const bool some = deviation_bytes(s, block) > 0;
     for (uint32_t n = 0; n < count; n++) {
         const trip_square *of = &squares[n];
         uint32_t at[2];
@@ -177,20 +201,31 @@ static uint32_t fill_squares(const trip_gl_sheets *s, const trip_run *run, const
             .mask_high = (uint32_t)(of->mask >> 32),
             .codes = (uint32_t)(codes + (size_t)(of->codes - squares[0].codes)),
             .min_width = of->min | of->width << 16,
-            .corner = (u & 0xffff) | v << 16
+            .corner = (u & 0xffff) | v << 16,
+            .deviations = some ? (uint32_t)(deviations + of->first) : TRIP_GL_NO_DEVIATIONS,
         };
     }
     return count;
 }
 
-/* Copies the squares and codes of all runs into a slot. */
+/* Copies the codes of a run, and its deviations. Returns the end of the copy. */
+static unsigned char *copy_run(const trip_gl_sheets *s, const trip_block *block, unsigned char *to)
+{
+    const size_t codes = trip_block_codes_bytes(block), deviations = deviation_bytes(s, block);
+    memcpy(to, trip_block_codes(block), codes);
+    if (deviations > 0)
+        memcpy(to + codes, block->deviations, deviations);
+    return to + codes + deviations;
+}
+
+/* Copies the squares, codes and deviations of all runs into a slot. */
 static int begin_batch(trip_gl_sheets *s, const trip_batch *batch)
 {
     size_t squares = 0, bytes = sizeof(uint32_t); /* not 0: GL cannot bind an empty range */
     for (size_t i = 0; i < batch->run_count; i++) {
         const trip_block block = trip_block_of(batch, &batch->runs[i]);
         squares += block.squares;
-        bytes += trip_block_codes_bytes(&block);
+        bytes += trip_block_codes_bytes(&block) + deviation_bytes(s, &block);
     }
     size_t codes = trip_gl_ring_after(0, squares * sizeof(struct trip_gl_sheet_square));
     if (codes + bytes > trip_gl_context_limits(s->context)->storage_block_bytes)
@@ -204,11 +239,11 @@ static int begin_batch(trip_gl_sheets *s, const trip_batch *batch)
     s->batch = (trip_gl_sheet_batch){ .slot = slot, .codes_offset = codes, .begun = true };
     void *memory = slot->memory;
     struct trip_gl_sheet_square *square = memory;
-    for (size_t i = 0, at = 0; i < batch->run_count; i++) {
+    unsigned char *const first = slot->memory + codes, *to = first;
+    for (size_t i = 0; i < batch->run_count; i++) {
         const trip_block block = trip_block_of(batch, &batch->runs[i]);
-        square += fill_squares(s, &batch->runs[i], &block, at, square);
-        memcpy(slot->memory + codes + at, trip_block_codes(&block), trip_block_codes_bytes(&block));
-        at += trip_block_codes_bytes(&block);
+        square += fill_squares(s, &batch->runs[i], &block, (size_t)(to - first), square);
+        to = copy_run(s, &block, to);
     }
     return TRIP_OK;
 }
@@ -225,7 +260,8 @@ static void begin_sheet(trip_gl_sheets *s, int64_t number)
                                                             : (float)TRIP_GL_MISSING_WHOLE);
 }
 
-/* Widens the range of draw codes of the last sheet by the range of the run's brick. */
+/* Widens the ranges of draw codes and deviations of the last sheet by the ranges of the run's
+ * brick. */
 static void widen_range(trip_gl_sheets *s, const trip_batch *batch, const trip_run *run)
 {
     const trip_file_brick *brick = &trip_batch_list(batch, run)->bricks[run->brick];
@@ -234,6 +270,8 @@ static void widen_range(trip_gl_sheets *s, const trip_batch *batch, const trip_r
     trip_gl_sheet *sheet = &s->held[s->count - 1];
     sheet->min = range.min < sheet->min ? range.min : sheet->min;
     sheet->max = range.max > sheet->max ? range.max : sheet->max;
+    if (s->effects & TRIP_GL_BLURRED && brick->deviation_max > sheet->deviation)
+        sheet->deviation = brick->deviation_max;
 }
 
 static int decode_squares(trip_gl_sheets *s, uint32_t first, uint32_t count)
@@ -252,6 +290,11 @@ static int decode_squares(trip_gl_sheets *s, uint32_t first, uint32_t count)
                        GL_WRITE_ONLY, GL_R32F);
     if (s->effects & TRIP_GL_EXACT)
         glBindBufferBase(GL_SHADER_STORAGE_BUFFER, TRIP_GL_DRAW_CODES, s->function.draw_codes);
+    if (s->effects & TRIP_GL_BLURRED) {
+        glBindImageTexture(TRIP_GL_IMAGE_DEVIATIONS, s->textures.deviations, 0, GL_FALSE,
+                           s->held[s->count - 1].layer, GL_WRITE_ONLY, GL_R16);
+        glBindBufferBase(GL_SHADER_STORAGE_BUFFER, TRIP_GL_DRAW_DEVIATIONS, s->blur.growths);
+    }
     glUniform2ui(TRIP_GL_SHEET, first, trip_block_step(&form));
     glDispatchCompute(count, 1, 1);
     glMemoryBarrier(GL_TEXTURE_FETCH_BARRIER_BIT | GL_TEXTURE_UPDATE_BARRIER_BIT);
@@ -294,7 +337,7 @@ static double eye_behind(const trip_gl_sheets *s, int i)
 static bool shows(const trip_gl_sheets *s, int i)
 {
     const int about = sheets_about(s->frame->settings) - 1;
-    unsigned min = UINT16_MAX, max = 0;
+    unsigned min = UINT16_MAX, max = 0, deviation = 0;
     double bounds[2];
     if (i < 0 || i + 1 >= s->count || s->held[i].min > s->held[i].max ||
         s->held[i + 1].min > s->held[i + 1].max || eye_behind(s, i) >= 1)
@@ -303,10 +346,16 @@ static bool shows(const trip_gl_sheets *s, int i)
         if (k >= 0 && k < s->count) {
             min = s->held[k].min < min ? s->held[k].min : min;
             max = s->held[k].max > max ? s->held[k].max : max;
+            deviation = s->held[k].deviation > deviation ? s->held[k].deviation : deviation;
         }
-    trip_field_code_bounds(s->frame->settings->kernel, min, max, bounds);
-    return trip_gl_sheet_tf_shows(&s->function, (unsigned)fmax(0, floor(bounds[0])),
-                                  (unsigned)fmin(65535, ceil(bounds[1])));
+    const trip_kernel kernel = s->frame->settings->kernel;
+    trip_field_code_bounds(kernel, min, max, bounds);
+    const trip_code_range range =
+        trip_brick_range_blurred(kernel, &s->frame->plan->draw,
+                                 (trip_code_range){ (uint16_t)fmax(0, floor(bounds[0])),
+                                                    (uint16_t)fmin(65535, ceil(bounds[1])) },
+                                 deviation);
+    return trip_gl_sheet_tf_shows(&s->function, range.min, range.max);
 }
 
 /* Sets the distances to the sheets below and above a sheet. */
@@ -442,6 +491,10 @@ static int bind_drawing(trip_gl_sheets *s, const trip_gl_band *band)
         glBindBufferBase(GL_SHADER_STORAGE_BUFFER, TRIP_GL_POSITIONS, s->positions.buffer);
     glBindTextureUnit(TRIP_GL_SHEET_CODES, s->textures.codes);
     glBindTextureUnit(TRIP_GL_SHEET_GRADIENTS, s->textures.gradients);
+    if (s->effects & TRIP_GL_BLURRED) {
+        glBindTextureUnit(TRIP_GL_SHEET_DEVIATIONS, s->textures.deviations);
+        trip_gl_sheet_blur_bind(&s->blur);
+    }
     if (s->effects & TRIP_GL_PLACED) {
         trip_gl_lattices_bind(s->lattices);
         trip_gl_lattices_bind_block(s->lattices, (unsigned)s->axis);

@@ -9,6 +9,7 @@
 #include "gl/constants.h"
 #include "gl/lattices.h"
 #include "gl/ring.h"
+#include "gl/sheet_blur.h"
 #include "gl/sheet_tf.h"
 #include "gl/sheet_pass.h"
 #include "gl/sheet_positions.h"
@@ -19,15 +20,16 @@
 /* A sheet in GL memory. It is complete once the next sheet begins. */
 typedef struct trip_gl_sheet {
     int64_t number;
-    int layer;         /* index in the textures */
-    unsigned min, max; /* bounds of its codes; min > max if it is empty */
+    int layer;          /* index in the textures */
+    unsigned min, max;  /* bounds of its codes; min > max if it is empty */
+    unsigned deviation; /* maximum of its deviation codes; 0 if nothing is blurred */
     bool has_gradients;
 } trip_gl_sheet;
 
 /* The current batch, copied into a slot of the ring. */
 typedef struct trip_gl_sheet_batch {
     trip_gl_slot *slot;
-    size_t codes_offset; /* offset of the codes, which follow the squares */
+    size_t codes_offset; /* offset of the codes and deviations, which follow the squares */
     size_t next_run;     /* the first run not yet decoded */
     uint32_t next_square;
     bool begun;
@@ -55,6 +57,7 @@ typedef struct trip_gl_sheets {
 
     trip_gl_sheet_textures textures;
     trip_gl_sheet_tf function;
+    trip_gl_sheet_blur blur;
     trip_gl_sheet_positions positions;
     GLuint pass_block, ends_block;
     const trip_frame *frame;

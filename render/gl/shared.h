@@ -26,6 +26,8 @@
 #define TRIP_GL_SUMS 7
 #define TRIP_GL_POSITIONS 5
 #define TRIP_GL_DRAW_CODES 4
+#define TRIP_GL_DRAW_DEVIATIONS 1
+#define TRIP_GL_BLURRED_SUMS 2
 /* Reused for splats of grids with uneven spacing; indexed lists use the second number. */
 #define TRIP_GL_VOXEL_POSITIONS 7
 #define TRIP_GL_VOXEL_POSITIONS_INDEXED 0
@@ -37,9 +39,11 @@
 #define TRIP_GL_LIGHT_REACHED 8
 #define TRIP_GL_LIGHT_OPEN 9
 #define TRIP_GL_HEAT 10
+#define TRIP_GL_SHEET_DEVIATIONS 11
 /* Image units. */
 #define TRIP_GL_IMAGE 0 /* a layer or a sheet */
 #define TRIP_GL_IMAGE_DEPTH 1
+#define TRIP_GL_IMAGE_DEVIATIONS 1
 /* Outputs of a layer and of the merged picture. Depths exist only with settings.depth. */
 #define TRIP_GL_OUT_COLOUR 0
 #define TRIP_GL_OUT_DEPTH 1
@@ -64,6 +68,11 @@
 #define TRIP_GL_SQUARE_GROUP 8
 /* Maximum number of segment ends drawn at once. */
 #define TRIP_GL_ENDS_MAX 160
+/* Rows of a blurred function, and the 4 in the formula of its deviations (blurred_function.h). */
+#define TRIP_GL_BLURRED_ROWS 33
+#define TRIP_GL_BLURRED_BEFORE 4
+/* Offset of the deviations of squares without any. */
+#define TRIP_GL_NO_DEVIATIONS 0xffffffffu
 /* Number of steps between emission colours, TRIP_EMISSION_STEPS. */
 #define TRIP_GL_EMISSION_STEPS 256
 
@@ -246,18 +255,34 @@ struct trip_gl_square {
 
 /* A square of a block to decode into a sheet. `codes` is the byte offset of its codes. `min_width`
  * holds the minimum and width of the codes, 16 bits each. `corner` holds u and v of the corner in
- * the sheet, 16 bits each. */
+ * the sheet, 16 bits each. `deviations` is the byte offset of its deviations. */
 struct trip_gl_sheet_square {
     TRIP_GL_UINT mask_low, mask_high;
     TRIP_GL_UINT codes;
     TRIP_GL_UINT min_width;
     TRIP_GL_UINT corner;
+    TRIP_GL_UINT deviations;
 };
 
 /* The transfer function at a code. `entry` holds red, green, blue and the extinction of one voxel
  * length. `low` and `high` hold its integrals from code 0, 64 bits each: extinction times each
  * colour, and extinction. */
 struct trip_gl_sum {
+    TRIP_GL_UINT low[4], high[4];
+    TRIP_GL_FLOAT entry[4];
+};
+
+/* A row of a blurred function. Its entries begin at `first`, `per_code` of them for each code.
+ * `unit` is the value of 1 in its sums, for extinction per voxel length. `power` is the fourth
+ * power of its deviation code, divided by 255. */
+struct trip_gl_blurred_row {
+    TRIP_GL_UINT first;
+    TRIP_GL_FLOAT per_code, unit, power;
+};
+
+/* An entry of a row. `entry` holds extinction per world unit times red, green and blue, and
+ * extinction. `low` and `high` hold the integrals of the row from code 0, as in trip_gl_sum. */
+struct trip_gl_blurred_entry {
     TRIP_GL_UINT low[4], high[4];
     TRIP_GL_FLOAT entry[4];
 };

@@ -3,12 +3,13 @@
 #include "report.h"
 
 /* Layers above the minimum may take only 1 / SHARE of the memory left. */
-enum { SHARE = 4, CODE_BYTES = 4, GRADIENT_BYTES = 8 };
+enum { SHARE = 4, CODE_BYTES = 4, GRADIENT_BYTES = 8, DEVIATION_BYTES = 2 };
 
 void trip_gl_sheet_textures_release(trip_gl_sheet_textures *t)
 {
     glDeleteTextures(1, &t->codes);
     glDeleteTextures(1, &t->gradients);
+    glDeleteTextures(1, &t->deviations);
     trip_budget_discharge(t->budget, t->bytes);
     *t = (trip_gl_sheet_textures){ .budget = t->budget };
 }
@@ -49,10 +50,10 @@ static GLuint make_texture(const trip_gl_sheet_textures *t, GLenum format)
 }
 
 static int make(trip_gl_sheet_textures *t, int64_t width, int64_t height, unsigned min,
-                bool gradients)
+                bool gradients, bool deviations)
 {
     uint64_t sheet = (uint64_t)width * (uint64_t)height;
-    sheet *= gradients ? CODE_BYTES + GRADIENT_BYTES : CODE_BYTES;
+    sheet *= CODE_BYTES + (gradients ? GRADIENT_BYTES : 0) + (deviations ? DEVIATION_BYTES : 0);
     uint64_t layers = trip_budget_left_bytes(t->budget) / SHARE / sheet;
     layers = layers < min ? min : layers;
     layers = layers > TRIP_GL_SHEETS_MAX ? TRIP_GL_SHEETS_MAX : layers;
@@ -64,6 +65,7 @@ static int make(trip_gl_sheet_textures *t, int64_t width, int64_t height, unsign
     t->layers = (int)layers;
     t->codes = make_texture(t, GL_R32F);
     t->gradients = gradients ? make_texture(t, GL_RGBA16F) : 0;
+    t->deviations = deviations ? make_texture(t, GL_R16) : 0;
     if (glGetError() == GL_NO_ERROR)
         return TRIP_OK;
     trip_gl_sheet_textures_release(t);
@@ -72,15 +74,29 @@ static int make(trip_gl_sheet_textures *t, int64_t width, int64_t height, unsign
                      (long long)height);
 }
 
+/* Adds deviations to textures without any. Returns false if the memory does not suffice. */
+static bool add_deviations(trip_gl_sheet_textures *t)
+{
+    const uint64_t bytes =
+        (uint64_t)t->width * (uint64_t)t->height * (uint64_t)t->layers * DEVIATION_BYTES;
+    if (bytes > trip_budget_left_bytes(t->budget) / SHARE || !trip_budget_charge(t->budget, bytes))
+        return false;
+    t->bytes += bytes;
+    t->deviations = make_texture(t, GL_R16);
+    return glGetError() == GL_NO_ERROR;
+}
+
+/* Parts of a picture may have different levels of detail, of which only the coarse ones have
+ * deviations. So textures with deviations also serve frames without them. */
 int trip_gl_sheet_textures_fit(trip_gl_sheet_textures *t, int64_t width, int64_t height,
-                               unsigned min, bool gradients)
+                               unsigned min, bool gradients, bool deviations)
 {
     if (t->codes && width <= t->width && height <= t->height && t->layers >= (int)min &&
-        gradients == (t->gradients != 0))
+        gradients == (t->gradients != 0) && (t->deviations || !deviations || add_deviations(t)))
         return TRIP_OK;
     trip_gl_sheet_textures_release(t);
     int status = check_size(width, height);
-    return status ? status : make(t, width, height, min, gradients);
+    return status ? status : make(t, width, height, min, gradients, deviations);
 }
 
 void trip_gl_sheet_textures_clear(const trip_gl_sheet_textures *t, int layer, int width, int height,

@@ -27,14 +27,16 @@ static const struct {
                              true },
     [TRIP_GL_PASS_REGION] = { "screen.vert", "region.frag", NULL, 0, true },
     [TRIP_GL_PASS_MERGE] = { "screen.vert", "merge.frag", NULL, TRIP_GL_DEPTH, true },
-    [TRIP_GL_PASS_SHEET_DECODE] = { NULL, NULL, "sheet_decode.comp", TRIP_GL_EXACT, false },
+    [TRIP_GL_PASS_SHEET_DECODE] = { NULL, NULL, "sheet_decode.comp",
+                                    TRIP_GL_EXACT | TRIP_GL_BLURRED, false },
     [TRIP_GL_PASS_SHEET_GRADIENT] = { NULL, NULL, "sheet_gradient.comp",
                                       TRIP_GL_UNEVEN | TRIP_GL_EXACT | TRIP_GL_NEAREST, false },
     [TRIP_GL_PASS_SHEET_DRAW] = { NULL, NULL, "sheet_draw.comp",
                                   TRIP_GL_PARALLEL | TRIP_GL_SHADED | TRIP_GL_HEADLIGHT |
                                       TRIP_GL_DEPTH | TRIP_GL_WIDE | TRIP_GL_CUED | TRIP_GL_UNEVEN |
                                       TRIP_GL_EXACT | TRIP_GL_SHADOWS | TRIP_GL_OCCLUSION |
-                                      TRIP_GL_EMISSION | TRIP_GL_CLOSED | TRIP_GL_NEAREST,
+                                      TRIP_GL_EMISSION | TRIP_GL_CLOSED | TRIP_GL_NEAREST |
+                                      TRIP_GL_BLURRED,
                                   false },
 };
 
@@ -56,7 +58,7 @@ static void write_effects(FILE *out, unsigned effects)
         { TRIP_GL_OCCLUSION, "OCCLUSION" },   { TRIP_GL_EMISSION, "EMISSION" },
         { TRIP_GL_CLOSED, "CLOSED" },         { TRIP_GL_EXACT, "EXACT" },
         { TRIP_GL_NEAREST, "NEAREST" },       { TRIP_GL_RESIDENT, "RESIDENT" },
-        { TRIP_GL_TWO_POINTS, "TWO_POINTS" },
+        { TRIP_GL_TWO_POINTS, "TWO_POINTS" }, { TRIP_GL_BLURRED, "BLURRED" },
     };
     for (size_t i = 0; i < sizeof names / sizeof *names; i++)
         if (effects & names[i].effect)

@@ -148,11 +148,12 @@ static trip_code_range widened(trip_kernel kernel, trip_code_range range)
                               (uint16_t)fmin(65535, ceil(bounds[1])) };
 }
 
-/* Widens the range by the reach of deviations up to d. The weights of kernels of 64 voxels may
- * enlarge deviations, and a map of codes may enlarge them anywhere. */
-static trip_code_range blurred(const trip_brick_ranges *r, trip_code_range range, unsigned d)
+/* The weights of kernels of 64 voxels may enlarge deviations, and a map of codes may enlarge them
+ * anywhere. */
+trip_code_range trip_brick_range_blurred(trip_kernel kernel, const trip_draw_codes *draw,
+                                         trip_code_range range, unsigned d)
 {
-    const bool bounded = !trip_kernel_is_wide(r->kernel) && !r->draw->of_stored;
+    const bool bounded = !trip_kernel_is_wide(kernel) && !draw->of_stored;
     const double reach = ceil(trip_blurred_reach(bounded ? d : TRIP_DEVIATION_MAX));
     if (d == 0 || range.min > range.max)
         return range;
@@ -177,5 +178,5 @@ trip_code_range trip_brick_ranges_about(trip_brick_ranges *r, uint32_t slab,
                 if (r->deviations[layer] && r->deviations[layer][at] > deviation)
                     deviation = r->deviations[layer][at];
             }
-    return blurred(r, widened(r->kernel, range), deviation);
+    return trip_brick_range_blurred(r->kernel, r->draw, widened(r->kernel, range), deviation);
 }

@@ -39,4 +39,8 @@ void trip_brick_ranges_destroy(trip_brick_ranges *r);
 trip_code_range trip_brick_ranges_about(trip_brick_ranges *r, uint32_t slab,
                                         const trip_file_brick *brick);
 
+/* Widens a range of draw codes by the reach of deviation codes up to d. */
+trip_code_range trip_brick_range_blurred(trip_kernel kernel, const trip_draw_codes *draw,
+                                         trip_code_range range, unsigned d);
+
 #endif

@@ -444,11 +444,15 @@ class Accuracy(program.ProgramTest):
     def test_qualities_select_settings(self):
         """An explicit option wins over --quality, wherever it stands."""
         draw = lambda *options: self.picture("a.trip", "--size", "40x32", "--tf", "a.tf", *options)
-        same = {("--quality", "draft"): ("--samples-per-sheet", "1"),
+        one_ray = "--samples", "1", "--lod", "0"
+        exact = "--samples", "2", "--lod", "0", "--early-termination", 1 / 8192
+        same = {("--quality", "draft", "--samples-per-sheet", "1", *one_ray):
+                ("--samples-per-sheet", "1", *one_ray),
                 ("--quality", "normal"): (),
-                ("--quality", "high"): ("--samples-per-sheet", "8"),
-                ("--quality", "exact"): ("--samples-per-sheet", "16", "--early-termination", 1 / 8192),
-                ("--samples-per-sheet", "2", "--quality", "exact"): ("--samples-per-sheet", "2", "--early-termination", 1 / 8192),
+                ("--samples-per-sheet", "8", *one_ray, "--quality", "high"):
+                ("--samples-per-sheet", "8", *one_ray),
+                ("--quality", "exact"): ("--samples-per-sheet", "16", *exact),
+                ("--samples-per-sheet", "2", "--quality", "exact"): ("--samples-per-sheet", "2", *exact),
                 ("--quality", "draft", "--classify", "pre"): ("--classify", "pre")}
         pictures = [draw(*options) for options in same]
         for options, picture in zip(same, pictures):

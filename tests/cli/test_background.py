@@ -54,10 +54,9 @@ class Background(program.ProgramTest):
 
     def ways(self, volume, data):
         """Yields the ways to draw a volume and its data set."""
-        yield data, "--renderer", "reference"
-        yield data, "--renderer", "cpu", "--samples-per-sheet", "4"
-        for gl in program.GL:
-            yield data, "--renderer", gl
+        one_ray = "--samples-per-sheet", "4", "--samples", "1", "--lod", "0"
+        for renderer in "reference", "cpu", *program.GL:
+            yield data, "--renderer", renderer, *one_ray
         yield data, "--renderer", "integral", "--samples", "1"
         yield volume, "--renderer", "integral", "--samples", "1", "--field", "source"
 

@@ -69,7 +69,8 @@ class Look(program.ProgramTest):
             self.assertIn(says, run.stderr)
 
     def test_normalised_colours_are_divided_by_their_opacity(self):
-        view = ["--size=32x32", "--renderer", "cpu", "--tf", "viridis", "--opacity-scale", "0.2"]
+        view = ["--size=32x32", "--renderer", "cpu", "--tf", "viridis", "--opacity-scale", "0.2",
+                "--samples-per-sheet", "4", "--samples", "1", "--lod", "0"]
         plain = self.picture("ball.trip", *view, "--background", "none").astype(float)
         drawn = self.picture("ball.trip", *view, "--background", "1,0,0", "--normalise")
         covered, free = plain[..., 3] > 0.01, plain[..., 3] == 0

@@ -285,7 +285,7 @@ class Views(program.ProgramTest):
         """Returns the mean and the 99th percentile of the differences from the integral over the
         visible pixels, of 255."""
         options = name, "--size", "200x200", "--background", "none", *view
-        drawn = self.picture(*options, "--renderer=cpu")
+        drawn = self.picture(*options, "--renderer=cpu", "--samples=1")
         exact = self.picture(*options, "--renderer=integral", "--samples=1")
         apart = 255 * abs(drawn - exact).max(axis=-1)[exact[..., 3] > 1 / 255]
         return apart.mean(), numpy.percentile(apart, 99)

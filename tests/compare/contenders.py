@@ -183,7 +183,8 @@ NAMES = ["triptych-cpu", *["triptych-" + quality for quality in QUALITIES], POST
 def make(name, prepared, threads):
     if name.startswith(POST):
         return Triptych(prepared, "cpu", threads, name,
-                        ["--classify", "post", "--samples-per-sheet", name[len(POST):]])
+                        ["--classify", "post", "--samples", "1", "--lod", "0", "--samples-per-sheet",
+                         name[len(POST):]])
     if name[len("triptych-"):] in QUALITIES:
         return Quality(prepared, name[len("triptych-"):], threads)
     if name == "vtk-cpu-half":

@@ -25,7 +25,7 @@ import scenes
 sys.path.insert(0, os.path.join(scenes.HERE, "..", "cli"))
 from exr import read_exr  # noqa: E402
 
-AIMS = {"draft": 4, "normal": 1, "high": 0.3}  # mean error, of 255
+PROMISES = {"draft": 4, "normal": 1, "high": 0.3}  # mean error, of 255
 QUALITIES = {name: ["--quality", name] for name in ("draft", "normal", "high", "exact")}
 FINEST = ["--lod", "0"]
 VTK_PX = 2048  # greatest edge of VTK's pictures
@@ -243,7 +243,7 @@ def pixels(options):
 
 
 def by_functions(options):
-    """Error by functions, and how often qualities reach their aims."""
+    """Error by functions, and how often qualities keep their promises."""
     result, rows = [], []
     for volume, path in volumes(options, 6):
         # The whole volume has this range, whatever the function keeps.
@@ -264,9 +264,9 @@ def by_functions(options):
                 log(" ".join(rows[-1]))
     print("Mean error of 255:\n")
     print(table(["volume", "function", "pixels", "voxel, pixels", *QUALITIES], rows) + "\n")
-    for name, most in AIMS.items():
+    for name, most in PROMISES.items():
         errors = [one["errors"][name] for one in result if one["errors"][name] is not None]
-        print("%s aims at %g: reached in %d of %d cases, greatest mean error %s." %
+        print("%s promises %g: kept in %d of %d cases, greatest mean error %s." %
               (name, most, sum(e <= most for e in errors), len(errors),
                number(max(errors, default=None))))
     print(notes("truth", "error", "view"))

@@ -263,6 +263,34 @@ static void pictures_are_part_of_the_given_memory(void **state)
     triptych_destroy(t); /* also frees the picture */
 }
 
+/* Each frame also needs a picture of 16 rays per pixel, 2.4 MB. */
+static void more_memory_never_draws_less(void **state)
+{
+    static float rgba[FLOATS];
+    draw_settings s = { .all.samples = 4 };
+    int drawn = 0, refused = 0;
+    (void)state;
+    for (uint64_t memory = 6 << 20; memory < 24 << 20; memory += 500000) {
+        triptych *t = new_context();
+        assert_int_equal(triptych_open(t, DATA_SET,
+                                       &(triptych_resources){ .memory_bytes = memory,
+                                                              .threads = 2,
+                                                              .renderer = TRIPTYCH_RENDERER_CPU }),
+                         TRIPTYCH_OK);
+        assert_int_equal(triptych_set_view(t, &(triptych_view){ .width = SIZE, .height = SIZE }),
+                         TRIPTYCH_OK);
+        assert_int_equal(draw_settings_use(t, &s), TRIPTYCH_OK);
+        const bool draws = triptych_draw(t, rgba) == TRIPTYCH_OK;
+        if (!draws && drawn > 0)
+            fail_msg("%llu bytes: %s", (unsigned long long)memory, triptych_error(t));
+        drawn += draws;
+        refused += !draws;
+        triptych_destroy(t);
+    }
+    print_message("%d memories drew, %d were too little\n", drawn, refused);
+    assert_true(drawn > 1 && refused > 0);
+}
+
 /* Checks the classification of a frame with these settings, in its statistics and in the words of
  * its plan. */
 static void check_classified(triptych *t, const draw_settings *s, triptych_classify expected,
@@ -290,7 +318,7 @@ static void settings_for_splats_select_pre(void **state)
     draw_settings defaults = { 0 }, s = defaults;
     assert_int_equal(defaults.all.classify, TRIPTYCH_CLASSIFY_AUTO);
     open_data(t, TRIPTYCH_RENDERER_CPU);
-    check_classified(t, &s, TRIPTYCH_CLASSIFY_POST, "by the view");
+    check_classified(t, &s, TRIPTYCH_CLASSIFY_POST, "normal promises 1");
     s.sheet.samples = 4;
     check_classified(t, &s, TRIPTYCH_CLASSIFY_POST, "at 4 samples per sheet");
     s = defaults;
@@ -324,8 +352,12 @@ static void depth_is_the_distance_of_the_visible_surface(void **state)
     draw_settings settings = { 0 };
     triptych_info info;
     int seen = 0;
-    settings.all.depth = 1;
+    settings.all.samples = 1;
+    settings.sheet.samples = 4;
+    settings.lod.voxel_px = TRIPTYCH_ZERO;
     open_data(t, TRIPTYCH_RENDERER_CPU);
+    assert_int_equal(draw_settings_use(t, &settings), TRIPTYCH_OK);
+    settings.all.depth = 1;
     assert_int_equal(triptych_get_info(t, &info), TRIPTYCH_OK);
     const double middle = (info.lo[1] + info.hi[1]) / 2, far = 1000;
     const triptych_view view = {
@@ -1134,6 +1166,8 @@ static draw_settings with_effects(int effects)
     memcpy(s.light.toward, light, sizeof light);
     s.effects.which = effects;
     s.effects.light_cells = 32;
+    s.all.samples = 1; /* the reference is slow */
+    s.sheet.samples = 2;
     return s;
 }
 
@@ -1438,6 +1472,7 @@ int main(void)
         cmocka_unit_test(the_plan_of_a_frame_can_be_printed),
         cmocka_unit_test(the_reported_camera_gives_the_same_picture),
         cmocka_unit_test(pictures_are_part_of_the_given_memory),
+        cmocka_unit_test(more_memory_never_draws_less),
         cmocka_unit_test(depth_is_the_distance_of_the_visible_surface),
         cmocka_unit_test(a_probe_finds_the_visible_surface),
         cmocka_unit_test(the_histogram_counts_all_voxels),

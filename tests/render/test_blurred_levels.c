@@ -1,11 +1,12 @@
-/* Frames of coarse levels with deviations. Pictures are compared with closed forms, and the CPU
- * renderer with the reference. Threads, memory and tiles must not change a bit. */
+/* Frames of coarse levels with deviations. Compares the pictures of every renderer with closed
+ * forms, and the CPU renderer with the reference. Threads, memory and tiles must not change a bit.
+ * test_gl_levels.c tests gl further. */
 #include "cpu/cpu_renderer.h"
 #include "cpu/kernels/isa.h"
 #include "cpu_scenes.h"
-#include "dataset_level.h"
 #include "deviation.h"
 #include "kernel.h"
+#include "level_scenes.h"
 #include "plan.h"
 #include "splat.h"
 #include "test.h"
@@ -13,60 +14,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { SIDE = 48, PIXELS = TEST_BY_TURNS ? 40 : 72 };
-
-/* A scene with a coarse level, which `at` presents. */
-typedef struct level_scene {
-    scene of, at;
-} level_scene;
-
-typedef struct contents {
-    scene_voxel voxel;
-    unsigned (*deviation)(void *user, int i, int j, int k);
-    void *user;
-    unsigned tile;
-    int64_t dims[3];
-} contents;
-
-/* Level 0 is empty, since no frame here draws it. */
-static bool nothing(void *user, int i, int j, int k, unsigned *code, double gradient[3])
-{
-    (void)user, (void)i, (void)j, (void)k, (void)code, (void)gradient;
-    return false;
-}
-
-static void create(level_scene *l, const contents *c)
-{
-    const scene_part part = { .level = 1,
-                              .kind = TRIP_KIND_VALUES,
-                              .by = { 2, 2, 2 },
-                              .voxel = c->voxel,
-                              .deviation = c->deviation,
-                              .user = c->user };
-    scene_create(&l->of,
-                 &(scene_params){ .dims = { 2 * c->dims[0], 2 * c->dims[1], 2 * c->dims[2] },
-                                  .tile_voxels = c->tile ? c->tile : 64,
-                                  .slab_sheets = 8,
-                                  .voxel = nothing,
-                                  .parts = &part,
-                                  .part_count = 1 });
-    l->at = l->of;
-    l->at.level = 1;
-    assert_int_equal(trip_dataset_level_open(&l->at.data, l->of.data, 1), 0);
-}
-
-static void destroy(level_scene *l)
-{
-    trip_dataset_level_close(l->at.data);
-    scene_destroy(&l->of);
-}
-
-static trip_settings settings_of_levels(void)
-{
-    trip_settings s = scene_post(2);
-    s.lod_px = 1;
-    return s;
-}
+enum { PIXELS = TEST_BY_TURNS ? 40 : 72 };
 
 /* ---- closed forms ---- */
 
@@ -97,8 +45,6 @@ static double share_above(double threshold, const even *e)
     return 0.5 * erfc((threshold - e->code) / deviation * sqrt(0.5));
 }
 
-static const scene_renderer *const renderers[] = { &cpu_scenes_reference, &cpu_scenes_cpu };
-
 /* Codes from THRESHOLD on have a constant extinction. Blurred, the extinction of a value is in
  * proportion to the share of its distribution above the threshold. The tested deviations are rows
  * of the blurred function, up to the rounding of their codes. */
@@ -111,22 +57,22 @@ static void a_step_has_the_mean_extinction_of_the_distribution(void **state)
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         even e = cases[i];
         level_scene l;
-        create(&l, &(contents){ even_voxel, even_deviation, &e, .dims = { 32, 32, LENGTH } });
+        level_scene_create(
+            &l, &(level_contents){ even_voxel, even_deviation, &e, .dims = { 32, 32, LENGTH } });
         scene_colour(&l.of, THRESHOLD, 65535, 1, 0.5, 0.25, 0.05);
-        memcpy(l.at.table, l.of.table, 65536 * sizeof *l.of.table);
+        level_scene_use_colours(&l);
         trip_camera_params view = scene_view(&l.at, trip_v3(0, 0, 1), 300, 40, PIXELS);
         view.ortho_height = 40;
-        const trip_settings settings = settings_of_levels();
+        const trip_settings settings = level_scene_settings();
         const double depth =
             l.at.table[65535].extinction * share_above(THRESHOLD - 0.5, &e) * 2 * (LENGTH - 1);
-        for (size_t n = 0; n < 2; n++) {
-            scene_picture p = scene_draw(&l.at, renderers[n], &view, &settings);
-            const float *pixel = scene_pixel(&p, PIXELS / 2, PIXELS / 2);
+        scene_turn turn = scene_turns(scene_renderers_post(), &l.at, &view, &settings);
+        while (scene_take_turn(&turn)) {
+            const float *pixel = scene_pixel(&turn.picture, PIXELS / 2, PIXELS / 2);
             assert_close(pixel[3], 1 - exp(-depth), 0.004);
             assert_close(pixel[1], 0.5 * (1 - exp(-depth)), 0.004);
-            scene_picture_free(&p);
         }
-        destroy(&l);
+        level_scene_destroy(&l);
     }
 }
 
@@ -137,72 +83,28 @@ static void colours_are_weighted_by_extinction(void **state)
     enum { LENGTH = 16 };
     even e = { 30000, 128 };
     level_scene l;
-    create(&l, &(contents){ even_voxel, even_deviation, &e, .dims = { 32, 32, LENGTH } });
+    level_scene_create(
+        &l, &(level_contents){ even_voxel, even_deviation, &e, .dims = { 32, 32, LENGTH } });
     scene_colour(&l.of, 0, 29999, 1, 0, 0, 0.02);
     scene_colour(&l.of, 30000, 65535, 0, 0, 1, 0.08);
-    memcpy(l.at.table, l.of.table, 65536 * sizeof *l.of.table);
+    level_scene_use_colours(&l);
     const double red = l.of.table[0].extinction * (1 - share_above(29999.5, &e));
     const double blue = l.of.table[65535].extinction * share_above(29999.5, &e);
     const double alpha = 1 - exp(-(red + blue) * 2 * (LENGTH - 1));
     trip_camera_params view = scene_view(&l.at, trip_v3(0, 0, 1), 300, 40, PIXELS);
     view.ortho_height = 40;
-    const trip_settings settings = settings_of_levels();
-    for (size_t n = 0; n < 2; n++) {
-        scene_picture p = scene_draw(&l.at, renderers[n], &view, &settings);
-        const float *pixel = scene_pixel(&p, PIXELS / 2, PIXELS / 2);
+    const trip_settings settings = level_scene_settings();
+    scene_turn turn = scene_turns(scene_renderers_post(), &l.at, &view, &settings);
+    while (scene_take_turn(&turn)) {
+        const float *pixel = scene_pixel(&turn.picture, PIXELS / 2, PIXELS / 2);
         assert_close(pixel[3], alpha, 0.003);
         assert_close(pixel[0], alpha * red / (red + blue), 0.003);
         assert_close(pixel[2], alpha * blue / (red + blue), 0.003);
-        scene_picture_free(&p);
     }
-    destroy(&l);
+    level_scene_destroy(&l);
 }
 
 /* ---- the renderers agree ---- */
-
-/* Waves with deviations in some places. Voxels are missing where the wave is low. */
-static double wave(int i, int j, int k)
-{
-    return 0.5 + 0.25 * sin(0.31 * i + 0.2) + 0.25 * sin(0.27 * j) * cos(0.35 * k);
-}
-
-static bool wave_voxel(void *user, int i, int j, int k, unsigned *code, double gradient[3])
-{
-    (void)user;
-    (void)gradient;
-    *code = (unsigned)(65535 * wave(i, j, k));
-    return wave(i, j, k) > 0.2 && scene_hash(i, j, k) % 300 != 0;
-}
-
-static unsigned wave_deviation(void *user, int i, int j, int k)
-{
-    (void)user;
-    const double at = sin(0.2 * i) * sin(0.23 * j + 1) * sin(0.17 * k + 2);
-    return at > 0 ? (unsigned)(160 * at) : scene_hash(i, j, k) % 97 == 0 ? 200 : 0;
-}
-
-static const contents waves = { wave_voxel, wave_deviation, .dims = { SIDE, SIDE - 8, SIDE - 6 } };
-
-static void make_waves(level_scene *l, unsigned tile)
-{
-    contents c = waves;
-    c.tile = tile;
-    create(l, &c);
-    scene_colour(&l->of, 33000, 36000, 0.2, 0.5, 1, 0.1);
-    scene_colour(&l->of, 45001, 47000, 0.9, 0.4, 0.1, 0.15);
-    scene_colour(&l->of, 57000, 65535, 1, 1, 0.6, 0.25);
-    memcpy(l->at.table, l->of.table, 65536 * sizeof *l->of.table);
-}
-
-static trip_camera_params view_of(const level_scene *l, int number)
-{
-    const trip_vec3 from[] = { { 1, 0.8, 0.6 }, { -0.2, 1, 0.1 }, { 0.5, -0.4, -1 } };
-    trip_camera_params view =
-        scene_view(&l->at, from[number % 3], number == 1 ? 20 : 190, number == 1 ? 80 : 40, PIXELS);
-    if (number == 2)
-        view.ortho_height = 90;
-    return view;
-}
 
 static double compare(const level_scene *l, const trip_camera_params *view,
                       const trip_settings *settings)
@@ -223,11 +125,11 @@ static void cpu_agrees_with_the_reference(void **state)
 {
     (void)state;
     level_scene l;
-    make_waves(&l, 64);
+    level_scene_waves(&l, &level_waves);
     for (int number = 0; number < 3; number++) {
-        const trip_camera_params view = view_of(&l, number);
+        const trip_camera_params view = level_scene_view(&l, number, PIXELS);
         for (int kind = 0; kind < 5; kind++) {
-            trip_settings settings = settings_of_levels();
+            trip_settings settings = level_scene_settings();
             settings.shading = kind == 1;
             settings.depth = kind == 2;
             settings.effects.cueing = kind == 3 ? 0.5 : 0;
@@ -236,11 +138,11 @@ static void cpu_agrees_with_the_reference(void **state)
                 trip_clip_add(&settings.clip, trip_v3(1, 0.3, 0.2), -40);
             assert_close(compare(&l, &view, &settings), 0, scene_bound(&settings) + ROUNDING);
         }
-        trip_settings cubic = settings_of_levels();
+        trip_settings cubic = level_scene_settings();
         cubic.kernel = TRIP_KERNEL_CUBIC;
         assert_close(compare(&l, &view, &cubic), 0, scene_bound(&cubic) + ROUNDING);
     }
-    destroy(&l);
+    level_scene_destroy(&l);
 }
 
 /* A function that shows values only by their deviations. */
@@ -248,12 +150,12 @@ static void values_that_only_deviations_show_are_drawn(void **state)
 {
     (void)state;
     level_scene l;
-    create(&l, &waves);
+    level_scene_create(&l, &level_waves);
     scene_colour(&l.of, 100, 4000, 1, 0.5, 0.25, 0.4); /* below all values */
-    memcpy(l.at.table, l.of.table, 65536 * sizeof *l.of.table);
-    const trip_settings settings = settings_of_levels();
+    level_scene_use_colours(&l);
+    const trip_settings settings = level_scene_settings();
     for (int number = 0; number < 3; number++) {
-        const trip_camera_params view = view_of(&l, number);
+        const trip_camera_params view = level_scene_view(&l, number, PIXELS);
         scene_picture a = scene_draw(&l.at, &cpu_scenes_reference, &view, &settings);
         scene_picture b = scene_draw(&l.at, &cpu_scenes_cpu, &view, &settings);
         assert_true(scene_max_opaque(&a) > 0.03);
@@ -261,7 +163,7 @@ static void values_that_only_deviations_show_are_drawn(void **state)
         scene_picture_free(&a);
         scene_picture_free(&b);
     }
-    destroy(&l);
+    level_scene_destroy(&l);
 }
 
 /* All values are the same and not visible. Voxels beyond a border have a deviation that shows
@@ -286,12 +188,13 @@ static void bricks_out_of_reach_are_transparent(void **state)
     (void)state;
     int border = 80;
     level_scene l;
-    create(&l, &(contents){ unseen_voxel, deviation_beyond, &border, 16, { 128, 32, 16 } });
+    level_scene_create(&l, &(level_contents){ unseen_voxel, deviation_beyond, &border, 16,
+                                              .dims = { 128, 32, 16 } });
     scene_colour(&l.of, 40000, 65535, 1, 0.5, 0.25, 0.2);
-    memcpy(l.at.table, l.of.table, 65536 * sizeof *l.of.table);
+    level_scene_use_colours(&l);
     trip_camera_params view = scene_view(&l.at, trip_v3(0, 0, 1), 600, 40, PIXELS);
     view.ortho_height = 270;
-    trip_settings settings = settings_of_levels();
+    trip_settings settings = level_scene_settings();
     trip_camera camera;
     trip_plan plan;
     assert_int_equal(trip_camera_make(&camera, &view, &l.at.data->index_to_world), 0);
@@ -307,14 +210,15 @@ static void bricks_out_of_reach_are_transparent(void **state)
     trip_plan_release(&plan, l.at.budget);
     const even e = { 30000, 160 };
     const double depth = l.at.table[65535].extinction * share_above(39999.5, &e) * 2 * 15;
-    scene_picture p = scene_draw(&l.at, &cpu_scenes_cpu, &view, &settings);
-    const float *seen = scene_pixel(&p, PIXELS / 2 + PIXELS / 4, PIXELS / 2);
-    const float *unseen = scene_pixel(&p, PIXELS / 2 - PIXELS / 4, PIXELS / 2);
-    const float *other = seen[3] > unseen[3] ? unseen : seen;
-    assert_close(seen[3] + unseen[3], 1 - exp(-depth), 0.006);
-    assert_true(other[3] == 0);
-    scene_picture_free(&p);
-    destroy(&l);
+    scene_turn turn = scene_turns(scene_renderers_post(), &l.at, &view, &settings);
+    while (scene_take_turn(&turn)) {
+        const float *seen = scene_pixel(&turn.picture, PIXELS / 2 + PIXELS / 4, PIXELS / 2);
+        const float *unseen = scene_pixel(&turn.picture, PIXELS / 2 - PIXELS / 4, PIXELS / 2);
+        const float *other = seen[3] > unseen[3] ? unseen : seen;
+        assert_close(seen[3] + unseen[3], 1 - exp(-depth), 0.006);
+        assert_true(other[3] == 0);
+    }
+    level_scene_destroy(&l);
 }
 
 /* ---- the same bits ---- */
@@ -328,11 +232,13 @@ static void threads_and_tiles_draw_the_same(void **state)
 {
     (void)state;
     level_scene l, tiles;
-    make_waves(&l, 64);
-    make_waves(&tiles, 16);
+    level_scene_waves(&l, &level_waves);
+    level_contents small = level_waves;
+    small.tile = 16;
+    level_scene_waves(&tiles, &small);
     for (int number = 0; number < 3; number++) {
-        const trip_camera_params view = view_of(&l, number);
-        trip_settings settings = settings_of_levels();
+        const trip_camera_params view = level_scene_view(&l, number, PIXELS);
+        trip_settings settings = level_scene_settings();
         settings.shading = number == 1;
         scene_picture a = scene_draw(&l.at, &cpu_scenes_cpu, &view, &settings);
         scene_picture b = scene_draw(&tiles.at, &cpu_scenes_cpu, &view, &settings);
@@ -345,8 +251,8 @@ static void threads_and_tiles_draw_the_same(void **state)
         scene_picture_free(&b);
         scene_picture_free(&c);
     }
-    destroy(&l);
-    destroy(&tiles);
+    level_scene_destroy(&l);
+    level_scene_destroy(&tiles);
 }
 
 /* The level is so wide that its sheets do not fit the smaller memories, which draw it in windows.
@@ -355,19 +261,19 @@ static void any_memory_draws_the_same_or_is_reported_as_too_little(void **state)
 {
     (void)state;
     level_scene l;
-    contents wide = waves;
+    level_contents wide = level_waves;
     wide.dims[0] = 400;
     wide.dims[1] = 320;
     wide.dims[2] = 8;
-    create(&l, &wide);
+    level_scene_create(&l, &wide);
     scene_colour(&l.of, 33000, 36000, 0.2, 0.5, 1, 0.1);
     scene_colour(&l.of, 57000, 65535, 1, 1, 0.6, 0.4);
-    memcpy(l.at.table, l.of.table, 65536 * sizeof *l.of.table);
+    level_scene_use_colours(&l);
     const trip_camera_params view = scene_view(&l.at, trip_v3(0.6, 0.3, 1), 900, 50, PIXELS);
     const size_t bytes = 16 * (size_t)PIXELS * PIXELS;
     float *whole = malloc(bytes), *some = malloc(bytes);
     for (int kernel = TRIP_KERNEL_LINEAR; kernel <= TRIP_KERNEL_CUBIC; kernel++) {
-        trip_settings settings = settings_of_levels();
+        trip_settings settings = level_scene_settings();
         int drawn = 0, refused = 0;
         settings.kernel = (trip_kernel)kernel;
         assert_int_equal(
@@ -385,7 +291,7 @@ static void any_memory_draws_the_same_or_is_reported_as_too_little(void **state)
     }
     free(whole);
     free(some);
-    destroy(&l);
+    level_scene_destroy(&l);
 }
 
 /* Every instruction set draws the same, within the rounding of single precision. */
@@ -393,9 +299,9 @@ static void instruction_sets_agree(void **state)
 {
     (void)state;
     level_scene l;
-    make_waves(&l, 64);
-    const trip_camera_params view = view_of(&l, 0);
-    const trip_settings settings = settings_of_levels();
+    level_scene_waves(&l, &level_waves);
+    const trip_camera_params view = level_scene_view(&l, 0, PIXELS);
+    const trip_settings settings = level_scene_settings();
     setenv("TRIPTYCH_ISA", "plain", 1);
     scene_picture plain = scene_draw(&l.at, &cpu_scenes_cpu, &view, &settings);
     for (const trip_cpu_kernels *const *isa = trip_cpu_isas(); *isa; isa++) {
@@ -407,7 +313,7 @@ static void instruction_sets_agree(void **state)
     }
     unsetenv("TRIPTYCH_ISA");
     scene_picture_free(&plain);
-    destroy(&l);
+    level_scene_destroy(&l);
 }
 
 int main(void)

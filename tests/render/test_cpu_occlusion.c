@@ -33,7 +33,7 @@ static void look(looks *l, const scene *s, const trip_camera_params *params, int
                              .table = s->table };
     trip_cpu_layer_view_make(&l->view, &l->frame, axis, true);
     l->view.list = trip_dataset_find(s->data, axis, 0, TRIP_KIND_VOXELS);
-    l->mask = (trip_cpu_mask){ { ACROSS, ACROSS }, l->open };
+    l->mask = (trip_cpu_mask){ { ACROSS, ACROSS, 0 }, l->open };
 }
 
 static void open_only(looks *l, unsigned cell_x, unsigned cell_y)

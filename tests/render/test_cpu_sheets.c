@@ -282,6 +282,42 @@ static void grids_too_wide_for_the_memory_are_drawn_in_windows(void **state)
     scene_destroy(&uneven);
 }
 
+/* Patches of a few squares are visible or not. So the rays of a small picture that are next to each
+ * other are lit in different segments. */
+static bool patchy(void *user, int i, int j, int k, unsigned *code, double gradient[3])
+{
+    (void)user;
+    (void)gradient;
+    *code = scene_hash(i / 9, j / 7, k / 3) % 4 ? 20000 + 20 * (unsigned)(i + j)
+                                                : 40000 + scene_hash(i, j, k) % 20000;
+    return true;
+}
+
+/* With more memory, more sheets of an earlier group have left gradients in the pool. */
+static void small_pictures_are_lit_by_gradients_of_their_own_sheets(void **state)
+{
+    enum { EDGE = 12 };
+    static float much[4 * EDGE * EDGE], little[4 * EDGE * EDGE];
+    (void)state;
+    scene s;
+    scene_create(
+        &s, &(scene_params){
+                .dims = { 140, 130, 40 }, .tile_voxels = 64, .slab_sheets = 4, .voxel = patchy });
+    scene_colour(&s, 33000, 65535, 0.9, 0.4, 0.1, 0.05);
+    for (int i = 0; i < 12; i++) {
+        trip_settings settings = post(2 + i % 2);
+        trip_camera_params view = i / 2 % 2 ? parallel(&s) : from_outside(&s);
+        view.width = view.height = 8 + i / 4 * 2;
+        const scene_picture p = { .width = view.width, .height = view.height, .rgba = much };
+        assert_int_equal(cpu_scenes_draw_within(&s, UINT64_C(256) << 20, &settings, &view, much),
+                         0);
+        assert_int_equal(cpu_scenes_draw_within(&s, 6 << 20, &settings, &view, little), 0);
+        assert_shows(&p);
+        assert_memory_equal(much, little, 16 * (size_t)view.width * (size_t)view.height);
+    }
+    scene_destroy(&s);
+}
+
 static bool solid(void *user, int i, int j, int k, unsigned *code, double gradient[3])
 {
     (void)user;
@@ -420,6 +456,30 @@ static void check_gradients(const trip_cpu_kernels *k, uint64_t squares)
         }
 }
 
+/* Voxel n of a square in Morton order has the column of its even bits and the row of its odd bits.
+ * Code 0 counts as 1. */
+static void check_decode(const trip_cpu_kernels *k, uint64_t mask)
+{
+    uint16_t codes[64 + 32];
+    int next = 0;
+    for (int i = 0; i < 64 + 32; i++)
+        codes[i] =
+            (uint16_t)(i % 5 ? scene_hash(i, 3, 11) % 65536 : 65535u * (unsigned)(i / 5 % 2));
+    out = rasters[0];
+    k->sheet_decode(codes, mask, out.codes + 8 * TRIP_CPU_RASTER_STRIDE + 16);
+    for (int n = 0; n < 64; n++) {
+        const int u = 16 + (n & 1) + (n >> 1 & 2) + (n >> 2 & 4);
+        const int v = 8 + (n >> 1 & 1) + (n >> 2 & 2) + (n >> 3 & 4);
+        int16_t *at = &out.codes[v * TRIP_CPU_RASTER_STRIDE + u];
+        if (!(mask >> n & 1))
+            continue;
+        const int code = codes[next++];
+        assert_int_equal(*at, (code ? code : 1) - TRIP_CPU_CODE_BIAS);
+        *at = (int16_t)code_at(0, u, v);
+    }
+    assert_memory_equal(&out, &rasters[0], sizeof out); /* no other voxel is written */
+}
+
 static void check_ranges(const trip_cpu_kernels *k, uint64_t squares)
 {
     trip_cpu_square_ranges ranges;
@@ -462,10 +522,10 @@ static int64_t between(int a, int b, int w)
 }
 
 /* Squares at the right and lower edge use voxels beyond the edge. All others are left unchanged. */
-static void check_between(const trip_cpu_kernels *k, int w, bool gradients, uint64_t squares)
+static void check_between(const trip_cpu_kernels *k, int w, unsigned parts, uint64_t squares)
 {
     out = rasters[0];
-    k->sheet_between(&rasters[3], &rasters[4], squares, w << 16 | (16384 - w), gradients, &out);
+    k->sheet_between(&rasters[3], &rasters[4], squares, w << 16 | (16384 - w), parts, &out);
     for (int v = 0; v <= 64; v++)
         for (int u = 0; u <= 64; u++) {
             int a = code_at(3, u, v), b = code_at(4, u, v), i = v * TRIP_CPU_RASTER_STRIDE + u;
@@ -476,12 +536,17 @@ static void check_between(const trip_cpu_kernels *k, int w, bool gradients, uint
                                     sizeof out.gradients[i]);
                 continue;
             }
-            assert_int_equal(out.codes[i], is_missing(a) || is_missing(b) ? TRIP_CPU_CODE_MISSING
+            const bool missing = is_missing(a) || is_missing(b);
+            assert_int_equal(out.codes[i], !(parts & TRIP_CPU_PART_CODES) ? rasters[0].codes[i]
+                                           : missing                      ? TRIP_CPU_CODE_MISSING
                                                                           : between(a, b, w));
-            for (int n = 0; gradients && n < 3 && !is_missing(out.codes[i]); n++)
-                assert_int_equal(
-                    out.gradients[i].along[n],
-                    between(rasters[3].gradients[i].along[n], rasters[4].gradients[i].along[n], w));
+            for (int n = 0; n < 3 && !missing; n++) {
+                const int16_t *from = rasters[3].gradients[i].along;
+                const int16_t *to = rasters[4].gradients[i].along;
+                assert_int_equal(out.gradients[i].along[n], parts & TRIP_CPU_PART_GRADIENTS
+                                                                ? between(from[n], to[n], w)
+                                                                : rasters[0].gradients[i].along[n]);
+            }
         }
 }
 
@@ -525,10 +590,14 @@ static void check_deviations(const trip_cpu_kernels *k, int w, uint64_t squares)
 
 static void kernels_prepare_sheets_like_plain_code(void **state)
 {
+    const unsigned both = TRIP_CPU_PART_CODES | TRIP_CPU_PART_GRADIENTS;
     (void)state;
     fill_rasters();
     fill_deviations();
     for (const trip_cpu_kernels *const *isa = trip_cpu_isas(); *isa; isa++) {
+        check_decode(*isa, UINT64_MAX);
+        check_decode(*isa, UINT64_C(0xf00f123480000001));
+        check_decode(*isa, 1);
         check_ranges(*isa, UINT64_MAX);
         check_ranges(*isa, UINT64_C(0x8040201008040281));
         check_gradients(*isa, UINT64_MAX);
@@ -536,9 +605,11 @@ static void kernels_prepare_sheets_like_plain_code(void **state)
         check_cells(*isa, -5, 1);
         check_cells(*isa, TRIP_CPU_CODE_MIN, INT16_MAX);
         check_cells(*isa, 2, 290);
-        check_between(*isa, 8192, true, UINT64_MAX);
-        check_between(*isa, 5461, true, UINT64_C(0x8040201008040281));
-        check_between(*isa, 0, false, UINT64_MAX);
+        check_between(*isa, 8192, both, UINT64_MAX);
+        check_between(*isa, 5461, both, UINT64_C(0x8040201008040281));
+        check_between(*isa, 0, TRIP_CPU_PART_CODES, UINT64_MAX);
+        check_between(*isa, 8192, TRIP_CPU_PART_CODES, UINT64_C(0x8040201008040281));
+        check_between(*isa, 8192, TRIP_CPU_PART_GRADIENTS, UINT64_C(0x8040201008040281));
         check_deviations(*isa, 8192, UINT64_MAX);
         check_deviations(*isa, 5461, UINT64_C(0x8040201008040281));
     }
@@ -886,6 +957,7 @@ int main(void)
         cmocka_unit_test(any_tile_of_the_data_and_any_batch_draw_the_same),
         cmocka_unit_test(any_memory_draws_the_same_or_is_reported_as_too_little),
         cmocka_unit_test(grids_too_wide_for_the_memory_are_drawn_in_windows),
+        cmocka_unit_test(small_pictures_are_lit_by_gradients_of_their_own_sheets),
         cmocka_unit_test(occlusion_culling_draws_the_same),
         cmocka_unit_test(instruction_sets_agree),
         cmocka_unit_test(kept_integrals_equal_recomputed_ones),

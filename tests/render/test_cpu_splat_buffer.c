@@ -28,7 +28,7 @@ static int set_up(void **state)
     assert_int_equal(trip_cpu_buffer_fit(&f->buffer, PANES, false, f->budget), 0);
     trip_cpu_buffer_empty(&f->buffer);
     f->sorting.counts = f->counts;
-    f->mask = (trip_cpu_mask){ { ACROSS, ACROSS }, f->open };
+    f->mask = (trip_cpu_mask){ { ACROSS, ACROSS, 0 }, f->open };
     for (int i = 0; i < PANES; i++)
         f->open[i] = UINT64_MAX;
     *state = f;

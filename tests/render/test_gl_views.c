@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "brick.h"
+#include "dataset_level.h"
 #include "dataset_metadata.h"
 #include "scenes.h"
 #include "test.h"
@@ -224,6 +225,53 @@ static void means_agree_with_the_reference(void **state)
     }
 }
 
+/* Draws a coarse level with deviations by gl alone; test_blurred_levels.c tests cpu. Deviations
+ * must change some view. */
+static void check_level(const scene *level, tally *t)
+{
+    const scene_renderer *all = scene_renderers();
+    double change = 0;
+    for (int i = (int)level->level - 1; i < VIEWS; i += TEST_BY_TURNS ? 6 : 3) {
+        const trip_camera_params view = make_view(level, i);
+        trip_settings settings = trip_settings_default();
+        settings.classify = TRIP_CLASSIFY_POST;
+        settings.lod_px = 1;
+        scene_picture expected = scene_draw(level, &all[0], &view, &settings);
+        scene_picture p = scene_draw(level, &all[2], &view, &settings);
+        add(t, &expected, &p, &settings, views[i].name);
+        settings.deviations = false;
+        scene_picture without = scene_draw(level, &all[2], &view, &settings);
+        change = fmax(change, scene_difference(&p, &without));
+        scene_picture_free(&expected);
+        scene_picture_free(&p);
+        scene_picture_free(&without);
+    }
+    assert_true(change > 8.0 / 255);
+}
+
+static void levels_with_deviations_agree_with_the_reference(void **state)
+{
+    (void)state;
+    static const char *const names[] = { "tooth.nhdr", "stent.nrrd" };
+    if (!scene_renderers()[2].name)
+        skip();
+    for (int n = 0; n < 2; n++) {
+        scene s;
+        tally t = { 0, 0, 0 };
+        open_volume(&s, names[n], TRIP_LEVELS_FOR_POST);
+        for (unsigned level = 1; level <= 2; level++) {
+            scene at = s;
+            at.level = level;
+            assert_int_equal(trip_dataset_level_open(&at.data, s.data, level), 0);
+            check_level(&at, &t);
+            trip_dataset_level_close(at.data);
+        }
+        print_message("%s, levels 1 and 2: gl most %.4f mean %.5f of 1/255\n", names[n],
+                      255 * t.max, 255 * t.sum / t.components);
+        scene_destroy(&s);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -233,6 +281,7 @@ int main(void)
         cmocka_unit_test(nearly_opaque_black_and_white_agrees_with_the_reference),
         cmocka_unit_test(means_agree_with_the_reference),
         cmocka_unit_test(views_classified_after_interpolation_agree_with_the_reference),
+        cmocka_unit_test(levels_with_deviations_agree_with_the_reference),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -232,7 +232,7 @@ class View(program.ProgramTest):
                     "click 0.5 Variants of the papers\nclick 0.5 Kernel radius", "click 0.5 Compositing\nclick 0.5 Per sheet",
                     "click 0.2 Blend start (h)",
                     "click 0.5 Method\nclick 0.5 Clip", "click 0.5 Method\nclick 0.5 Axis",
-                    "click 0.4 Antialiasing", "click 0.5 Classification\nclick 0.5 Post (interpolation)",
+                    "click 0.9 Antialiasing", "click 0.5 Classification\nclick 0.5 Post (interpolation)",
                     "click 0.9 Samples per sheet", "click 0.5 Classification\nclick 0.5 Automatic",
                     "click 0.5 Classification\nclick 0.5 Post (interpolation)",
                     "click 0.5 Clipping\nclick 0.5 Clip the data\nclick 0.5 Clip box\n"

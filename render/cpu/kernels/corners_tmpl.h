@@ -116,14 +116,14 @@ INLINE wide two_gradients(wide blocks)
 #endif
 }
 
-INLINE void find_gradients(const trip_cpu_group *g, sample *s)
+INLINE void find_gradients(const trip_cpu_group *g, vi from, sample *s)
 {
     const char *pool = (const char *)g->pool;
     const int below = 3 * TRIP_CPU_RASTER_STRIDE * sizeof(int16_t);
     int32_t at[V];
     wide of[4];
     vi turned[4];
-    vi_store(at, s->gradient_at);
+    vi_store(at, from);
 #define OF_LANES(i)                                                                                \
     do {                                                                                           \
         wide above = two_gradients(blocks_of_lanes(pool, at, sizeof(int16_t), i));                 \
@@ -184,10 +184,10 @@ INLINE void find_deviations(const trip_cpu_group *g, sample *s)
     }
 }
 
-INLINE void find_gradients(const trip_cpu_group *g, sample *s)
+INLINE void find_gradients(const trip_cpu_group *g, vi from, sample *s)
 {
     for (int i = 0; i < V; i++) {
-        const int16_t *top = (const int16_t *)g->pool + s->gradient_at[i];
+        const int16_t *top = (const int16_t *)g->pool + from[i];
         const int16_t *bottom = top + 3 * TRIP_CPU_RASTER_STRIDE;
         for (int k = 0; k < 3; k++)
             s->gradient[k][i] = of_two(top[k], top[3 + k], s->top[i]) +

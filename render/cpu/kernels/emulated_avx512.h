@@ -141,6 +141,48 @@ typedef uint32_t emulated_8_u32 __attribute__((vector_size(32), may_alias));
 
 #ifdef TRIP_EMULATED_VBMI2
 #define __AVX512VBMI2__ 1
+
+typedef int16_t emulated_i16 __attribute__((vector_size(64), may_alias));
+
+static inline __m512i emulated_maskz_expand_epi16(uint32_t mask, __m512i a)
+{
+    emulated_i16 r = { 0 };
+    for (int i = 0, n = 0; i < 32; i++)
+        if (mask >> i & 1)
+            r[i] = ((emulated_i16)a)[n++];
+    return (__m512i)r;
+}
+#undef _mm512_maskz_expand_epi16
+#define _mm512_maskz_expand_epi16 emulated_maskz_expand_epi16
+
+static inline __m512i emulated_permutexvar_epi16(__m512i numbers, __m512i a)
+{
+    emulated_i16 r;
+    for (int i = 0; i < 32; i++)
+        r[i] = ((emulated_i16)a)[((emulated_i16)numbers)[i] & 31];
+    return (__m512i)r;
+}
+#undef _mm512_permutexvar_epi16
+#define _mm512_permutexvar_epi16 emulated_permutexvar_epi16
+
+static inline uint32_t emulated_cmpneq_epi16_mask(__m512i a, __m512i b)
+{
+    uint32_t mask = 0;
+    for (int i = 0; i < 32; i++)
+        mask |= (uint32_t)(((emulated_i16)a)[i] != ((emulated_i16)b)[i]) << i;
+    return mask;
+}
+#undef _mm512_cmpneq_epi16_mask
+#define _mm512_cmpneq_epi16_mask emulated_cmpneq_epi16_mask
+
+static inline void emulated_mask_storeu_epi16(void *to, uint8_t mask, __m128i a)
+{
+    for (int i = 0; i < 8; i++)
+        if (mask >> i & 1)
+            memcpy((char *)to + 2 * i, (const char *)&a + 2 * i, 2);
+}
+#undef _mm_mask_storeu_epi16
+#define _mm_mask_storeu_epi16 emulated_mask_storeu_epi16
 #endif
 
 #endif

@@ -56,6 +56,21 @@ typedef struct trip_cpu_voxels {
 typedef int16_t trip_cpu_deviations[TRIP_CPU_RASTER_VOXELS];
 #define TRIP_CPU_DEVIATION_PARTS 128
 
+/* Offset of a square's voxel in a raster from the square's first voxel, by Morton number n. */
+#define TRIP_CPU_PLACE(n)                                                                          \
+    ((((n) >> 1 & 1) | ((n) >> 2 & 2) | ((n) >> 3 & 4)) * TRIP_CPU_RASTER_STRIDE +                 \
+     (((n)&1) | ((n) >> 1 & 2) | ((n) >> 2 & 4)))
+#define TRIP_CPU_PLACES4(n)                                                                        \
+    TRIP_CPU_PLACE(n), TRIP_CPU_PLACE((n) + 1), TRIP_CPU_PLACE((n) + 2), TRIP_CPU_PLACE((n) + 3)
+#define TRIP_CPU_PLACES16(n)                                                                       \
+    TRIP_CPU_PLACES4(n), TRIP_CPU_PLACES4((n) + 4), TRIP_CPU_PLACES4((n) + 8),                     \
+        TRIP_CPU_PLACES4((n) + 12)
+static const uint16_t trip_cpu_places[64] = { TRIP_CPU_PLACES16(0), TRIP_CPU_PLACES16(16),
+                                              TRIP_CPU_PLACES16(32), TRIP_CPU_PLACES16(48) };
+#undef TRIP_CPU_PLACES16
+#undef TRIP_CPU_PLACES4
+#undef TRIP_CPU_PLACE
+
 /* An index of a code in a pool of rasters must fit 32 bits. */
 #define TRIP_CPU_RASTERS_MAX (INT32_MAX / (int32_t)(sizeof(trip_cpu_voxels) / sizeof(int16_t)))
 
@@ -87,13 +102,19 @@ typedef struct trip_cpu_sample {
     const struct trip_cpu_making *making; /* NULL if the whole sample plane is made */
 } trip_cpu_sample;
 
-/* State for making a sheet or sample plane on demand. Gradients of a sheet, and all voxels of a
- * sample plane between two sheets, are made square by square. The first thread that draws a ray
- * through a square makes it. Hidden and transparent squares are thus never made, and new data is in
- * the cache of its reader. */
+/* Squares that threads make on demand: bit masks, one word per raster of the grid. A thread makes
+ * the squares that it was the first to add to `begun`. */
+typedef struct trip_cpu_on_demand {
+    _Atomic uint64_t *begun, *made;
+} trip_cpu_on_demand;
+
+/* State for making a sheet or sample plane on demand. The codes of a sample plane between two
+ * sheets, and gradients, are made square by square. The first thread that draws a ray through a
+ * square makes it: codes if the segment may be visible, gradients if it is. Hidden and transparent
+ * squares are thus never made, and new data is in the cache of its reader. */
 typedef struct trip_cpu_making {
     const int32_t *rasters;
-    _Atomic uint64_t *begun, *made; /* bit masks of squares, one word per raster of the grid */
+    trip_cpu_on_demand codes, gradients; /* a sheet has its codes from the start */
     /* For a sheet: the sheets before and behind it in index order, or NULL. */
     const int32_t *before, *behind;
     /* For a sample plane: the sheets on both sides, and weights as in sheet_between(). NULL for a

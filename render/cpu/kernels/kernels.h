@@ -270,6 +270,9 @@ typedef uint32_t trip_cpu_project_kernel(const trip_cpu_view *view, const _Atomi
 typedef uint64_t trip_cpu_sheet_kernel(const trip_cpu_sheet_view *view, const trip_cpu_group *group,
                                        int x, int y, float *pixels);
 
+/* Parts of voxels. */
+enum { TRIP_CPU_PART_CODES = 1, TRIP_CPU_PART_GRADIENTS = 2 };
+
 /* The kernels of one instruction set. They are compiled once for layers without depth and once for
  * layers with depth. Arguments named `depths` hold one float per splat, and are unused without
  * depth. */
@@ -330,6 +333,9 @@ typedef struct trip_cpu_kernels {
     uint32_t (*drawn)(const trip_cpu_view *view, trip_cpu_scratch *s, const trip_cpu_splat *splats,
                       uint32_t count);
 
+    /* Writes the codes of a square's records, biased, to the voxels of `mask`. `to` is the square's
+     * first voxel in a raster. Writes no other voxel. Any codes may follow the records' codes. */
+    void (*sheet_decode)(const uint16_t codes[64 + 32], uint64_t mask, int16_t *to);
     /* Computes the ranges of codes of the given squares in a raster. All other squares get an empty
      * range. */
     void (*sheet_ranges)(const trip_cpu_voxels *raster, uint64_t squares,
@@ -344,11 +350,11 @@ typedef struct trip_cpu_kernels {
     void (*sheet_gradients)(trip_cpu_voxels *raster, uint64_t squares, const trip_cpu_voxels *left,
                             const trip_cpu_voxels *above, const trip_cpu_voxels *sheet_before,
                             const trip_cpu_voxels *sheet_behind);
-    /* Interpolates the squares' voxels between two rasters, with gradients if `gradients`.
-     * `weights` is w << 16 | 2^14 - w, where w is the weight of `to`. A voxel is missing if it is
-     * missing in either raster. */
+    /* Interpolates the squares' voxels between two rasters: codes, gradients or both. `weights` is
+     * w << 16 | 2^14 - w, where w is the weight of `to`. A voxel is missing if it is missing in
+     * either raster. */
     void (*sheet_between)(const trip_cpu_voxels *from, const trip_cpu_voxels *to, uint64_t squares,
-                          int32_t weights, bool gradients, trip_cpu_voxels *out);
+                          int32_t weights, unsigned parts, trip_cpu_voxels *out);
     /* Does the work of sheet_gradients() for outlines (sheet.h, `Nearest value`). */
     void (*sheet_outlines)(trip_cpu_voxels *raster, uint64_t squares, const trip_cpu_voxels *left,
                            const trip_cpu_voxels *above, const trip_cpu_voxels *sheet_before,

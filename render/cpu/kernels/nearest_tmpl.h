@@ -161,7 +161,8 @@ static void nearest_at(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
     }
     s->gradient_at = vi_load(at);
     s->index = ((vi_load(codes) + TRIP_CPU_CODE_BIAS) >> view->code_shift) + view->code_first;
-    s->lit = s->summed = false;
+    s->lit = 0;
+    s->summed = false;
 }
 
 /* Lets rays that see nothing read the gradient of the missing raster. Another thread may be making

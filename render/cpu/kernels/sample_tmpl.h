@@ -168,6 +168,61 @@ INLINE void vh_store_3(int16_t *p, vh a, vh b, vh c)
 
 static_assert(sizeof(trip_cpu_gradient) == 3 * sizeof(int16_t), "three numbers in a row");
 
+#if TRIP_SIMD == TRIP_SIMD_AVX512 && defined(__AVX512VBMI2__)
+
+/* Morton numbers of the voxels of four rows of a square, row by row. */
+#define ROW8(n) (n), (n) + 1, (n) + 4, (n) + 5, (n) + 16, (n) + 17, (n) + 20, (n) + 21
+typedef int16_t four_rows __attribute__((vector_size(64)));
+static const four_rows morton_of_rows = { ROW8(0), ROW8(2), ROW8(8), ROW8(10) };
+#undef ROW8
+
+/* Writes the voxels of four rows that have a bit in `mask`. Other threads may write the other
+ * voxels meanwhile. */
+INLINE void decode_rows(const uint16_t codes[32], uint32_t mask, int16_t *to)
+{
+    const four_rows missing = (four_rows){ 0 } + TRIP_CPU_CODE_MISSING;
+    four_rows at = (four_rows)_mm512_maskz_expand_epi16(mask, _mm512_loadu_si512(codes));
+    at = (at - (at == 0)) ^ INT16_MIN;
+    at = (four_rows)_mm512_mask_mov_epi16((__m512i)missing, mask, (__m512i)at);
+    const __m512i rows = _mm512_permutexvar_epi16((__m512i)morton_of_rows, (__m512i)at);
+    const uint32_t bits = _mm512_cmpneq_epi16_mask(rows, (__m512i)missing);
+#define STORE_ROW(i)                                                                               \
+    _mm_mask_storeu_epi16(to + (i)*TRIP_CPU_RASTER_STRIDE, (__mmask8)(bits >> 8 * (i)),            \
+                          _mm512_extracti32x4_epi32(rows, i))
+    STORE_ROW(0);
+    STORE_ROW(1);
+    STORE_ROW(2);
+    STORE_ROW(3);
+#undef STORE_ROW
+}
+
+static void sheet_decode(const uint16_t codes[64 + 32], uint64_t mask, int16_t *to)
+{
+    const uint32_t first = (uint32_t)mask;
+    decode_rows(codes, first, to);
+    decode_rows(codes + __builtin_popcount(first), (uint32_t)(mask >> 32),
+                to + 4 * TRIP_CPU_RASTER_STRIDE);
+}
+
+#else
+
+static void sheet_decode(const uint16_t codes[64 + 32], uint64_t mask, int16_t *to)
+{
+    int16_t biased[64];
+    const int16_t *next = biased;
+    for (int i = 0; i < 64; i++)
+        biased[i] = (int16_t)((codes[i] + (codes[i] == 0)) ^ TRIP_CPU_CODE_BIAS);
+    if (mask == UINT64_MAX) { /* each pair of voxels is adjacent in a row */
+        for (unsigned i = 0; i < 64; i += 2)
+            memcpy(to + trip_cpu_places[i], biased + i, 2 * sizeof *biased);
+        return;
+    }
+    for (uint64_t rest = mask; rest; rest &= rest - 1)
+        to[trip_cpu_places[__builtin_ctzll(rest)]] = *next++;
+}
+
+#endif
+
 INLINE int square_first(int square)
 {
     return square / TRIP_CPU_SQUARES_ACROSS * 8 * TRIP_CPU_RASTER_STRIDE +
@@ -365,13 +420,14 @@ INLINE vh mean_or_between(vh a, vh b, int32_t weights)
 
 /* Interpolates eight voxels from `at` on. */
 INLINE void voxels_between(const trip_cpu_voxels *from, const trip_cpu_voxels *to, int at,
-                           int32_t weights, bool gradients, trip_cpu_voxels *out)
+                           int32_t weights, unsigned parts, trip_cpu_voxels *out)
 {
     vh a = vh_load(from->codes + at), b = vh_load(to->codes + at);
-    vh codes = vh_select(vh_is_missing(a) | vh_is_missing(b), mean_or_between(a, b, weights),
-                         vh_set(TRIP_CPU_CODE_MISSING));
-    vh_store(out->codes + at, codes);
-    gradients = gradients && !all_are_missing(codes);
+    vh missing = vh_is_missing(a) | vh_is_missing(b);
+    if (parts & TRIP_CPU_PART_CODES)
+        vh_store(out->codes + at,
+                 vh_select(missing, mean_or_between(a, b, weights), vh_set(TRIP_CPU_CODE_MISSING)));
+    const bool gradients = parts & TRIP_CPU_PART_GRADIENTS && vh_bits(missing) != 0xff;
     const int16_t *c = (const int16_t *)&from->gradients[at];
     const int16_t *d = (const int16_t *)&to->gradients[at];
     int16_t *numbers = (int16_t *)&out->gradients[at];
@@ -385,18 +441,19 @@ INLINE int16_t number_between(int16_t a, int16_t b, int32_t weights)
 }
 
 INLINE void voxel_between(const trip_cpu_voxels *from, const trip_cpu_voxels *to, int at,
-                          int32_t weights, bool gradients, trip_cpu_voxels *out)
+                          int32_t weights, unsigned parts, trip_cpu_voxels *out)
 {
     const int16_t a = from->codes[at], b = to->codes[at];
     const bool missing = a == TRIP_CPU_CODE_MISSING || b == TRIP_CPU_CODE_MISSING;
-    out->codes[at] = missing ? TRIP_CPU_CODE_MISSING : number_between(a, b, weights);
-    for (int i = 0; i < 3 && gradients; i++)
+    if (parts & TRIP_CPU_PART_CODES)
+        out->codes[at] = missing ? TRIP_CPU_CODE_MISSING : number_between(a, b, weights);
+    for (int i = 0; i < 3 && parts & TRIP_CPU_PART_GRADIENTS; i++)
         out->gradients[at].along[i] =
             number_between(from->gradients[at].along[i], to->gradients[at].along[i], weights);
 }
 
 INLINE void squares_between(const trip_cpu_voxels *from, const trip_cpu_voxels *to,
-                            uint64_t squares, int32_t weights, bool gradients, trip_cpu_voxels *out)
+                            uint64_t squares, int32_t weights, unsigned parts, trip_cpu_voxels *out)
 {
     const int last = TRIP_CPU_SQUARES_ACROSS - 1;
     for (uint64_t rest = squares; rest; rest &= rest - 1) {
@@ -404,9 +461,9 @@ INLINE void squares_between(const trip_cpu_voxels *from, const trip_cpu_voxels *
         const int rows = square / TRIP_CPU_SQUARES_ACROSS == last ? 9 : 8;
         int at = square_first(square);
         for (int row = 0; row < rows; row++, at += TRIP_CPU_RASTER_STRIDE) {
-            voxels_between(from, to, at, weights, gradients, out);
+            voxels_between(from, to, at, weights, parts, out);
             if (square % TRIP_CPU_SQUARES_ACROSS == last)
-                voxel_between(from, to, at + 8, weights, gradients, out);
+                voxel_between(from, to, at + 8, weights, parts, out);
         }
     }
 }
@@ -454,13 +511,16 @@ static void sheet_rows(const int16_t *deviations, uint64_t squares, uint8_t out[
 
 static __attribute__((noinline)) void sheet_between(const trip_cpu_voxels *from,
                                                     const trip_cpu_voxels *to, uint64_t squares,
-                                                    int32_t weights, bool gradients,
+                                                    int32_t weights, unsigned parts,
                                                     trip_cpu_voxels *out)
 {
-    if (weights == (8192 << 16 | 8192))
-        squares_between(from, to, squares, 8192 << 16 | 8192, gradients, out);
+    const int32_t halves = 8192 << 16 | 8192;
+    if (weights == halves && parts == TRIP_CPU_PART_CODES)
+        squares_between(from, to, squares, halves, TRIP_CPU_PART_CODES, out);
+    else if (weights == halves && parts == TRIP_CPU_PART_GRADIENTS)
+        squares_between(from, to, squares, halves, TRIP_CPU_PART_GRADIENTS, out);
     else
-        squares_between(from, to, squares, weights, gradients, out);
+        squares_between(from, to, squares, weights, parts, out);
 }
 
 #endif

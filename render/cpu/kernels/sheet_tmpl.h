@@ -521,11 +521,13 @@ INLINE bool cells_show(const trip_cpu_group *g, unsigned segment, cell_box box)
 
 typedef struct patch_path {
     uint64_t segments; /* segments that may be visible */
+    uint64_t made;     /* segments with all codes made that the patch's rays read */
     uint64_t beyond;   /* segments in which rays may be beyond a side of the grid */
     /* For each sample plane: the raster that contains all rays of the patch, as an offset in the
      * pool. It is -1 if several rasters or none contain them. `within` is the position of
      * pane_path.base in this raster. */
     int32_t raster[TRIP_CPU_SEGMENTS + 1], within[TRIP_CPU_SEGMENTS + 1];
+    cell_boxes boxes; /* cells that rays meet, per segment */
 } patch_path;
 
 /* Returns whether a raster is not outermost. Outermost rasters are empty, and clamped rays may lie
@@ -567,33 +569,55 @@ static void find_nearest_raster(const trip_cpu_group *g, const pane_path *path, 
 }
 
 typedef struct pane_segments {
-    uint64_t some;    /* segments with a square that may be visible */
-    uint64_t made;    /* segments with all voxels made that rays read */
+    uint64_t some; /* segments with a square that may be visible */
+    uint64_t made; /* segments with all voxels made that rays read */
+    /* The rays meet many squares. Codes are then made for one patch at a time, and gradients for
+     * the visible rays of a stamp. */
+    bool sparse;
     cell_boxes boxes; /* cells that rays meet, per segment */
 } pane_segments;
+
+/* Minimum number of squares that rays meet in a segment if they are sparse. */
+enum { SPARSE_SQUARES = 50 };
+
+INLINE bool is_sparse(cell_box box)
+{
+    const int32_t across = (box.hi[0] >> 3) - (box.lo[0] >> 3) + 1;
+    return across * ((box.hi[1] >> 3) - (box.lo[1] >> 3) + 1) >= SPARSE_SQUARES;
+}
+
+/* Moves the boxes inside the grid. Rays beyond a side read cells at it. */
+static void move_boxes_inside(const trip_cpu_group *g, const pane_path *path, cell_boxes *boxes)
+{
+    const int32_t size[2] = { g->across * TRIP_CPU_RASTER, g->down * TRIP_CPU_RASTER };
+    for (unsigned n = 0; n < g->segments; n += V)
+        for (int a = 0; a < 2; a++) {
+            const int32_t first = greater_of(path->cells[a][0], 0);
+            const int32_t last = lesser_of(path->cells[a][1], size[a] - 1);
+            vi_store(boxes->lo[a] + n, vi_within(vi_load(boxes->lo[a] + n), first, last));
+            vi_store(boxes->hi[a] + n, vi_within(vi_load(boxes->hi[a] + n), first, last));
+        }
+}
 
 static void find_segments(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
                           const pane_path *path, int x, int y, pane_segments *out)
 {
     const ray_bounds r = bounds_of_beam(view, path, x, y, TRIP_CPU_PANE);
     cell_boxes samples;
-    const int32_t size[2] = { g->across * TRIP_CPU_RASTER, g->down * TRIP_CPU_RASTER };
     out->some = 0;
+    out->sparse = false;
     out->made = g->samples[0].making ? 0 : UINT64_MAX;
     find_boxes(g, path, &r, 0, g->segments, &samples);
     if (!some_square_of(g, g->some, both_boxes(&samples, 0, g->segments)))
         return;
     find_segment_boxes(0, g->segments - 1, &samples, &out->boxes);
-    for (unsigned n = 0; n < g->segments; n++)
-        if (some_square_of(g, g->visible[n], box_of_segment(&out->boxes, n)))
+    for (unsigned n = 0; n < g->segments; n++) {
+        const cell_box box = box_of_segment(&out->boxes, n);
+        if (some_square_of(g, g->visible[n], box))
             out->some |= UINT64_C(1) << n;
-    for (unsigned n = 0; n < g->segments; n += V) /* rays beyond a side read cells at it */
-        for (int a = 0; a < 2; a++) {
-            const int32_t first = greater_of(path->cells[a][0], 0);
-            const int32_t last = lesser_of(path->cells[a][1], size[a] - 1);
-            vi_store(out->boxes.lo[a] + n, vi_within(vi_load(out->boxes.lo[a] + n), first, last));
-            vi_store(out->boxes.hi[a] + n, vi_within(vi_load(out->boxes.hi[a] + n), first, last));
-        }
+        out->sparse |= !NEAREST && out->made == 0 && is_sparse(box);
+    }
+    move_boxes_inside(g, path, &out->boxes);
 }
 
 /* Returns whether rays may be beyond a side of the grid. */
@@ -611,15 +635,15 @@ static void find_patch(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
 {
     const ray_bounds r = bounds_of_beam(view, path, x, y, 8);
     unsigned placed = UINT32_MAX;
-    cell_boxes samples, boxes;
+    cell_boxes samples;
     const unsigned first = (unsigned)__builtin_ctzll(segments);
     const unsigned last = 63 - (unsigned)__builtin_clzll(segments);
     find_boxes(g, path, &r, first, last + 1, &samples);
-    find_segment_boxes(first, last, &samples, &boxes);
-    area->segments = area->beyond = 0;
+    find_segment_boxes(first, last, &samples, &area->boxes);
+    area->segments = area->beyond = area->made = 0;
     for (; segments; segments &= segments - 1) {
         unsigned n = (unsigned)__builtin_ctzll(segments);
-        const cell_box box = box_of_segment(&boxes, n);
+        const cell_box box = box_of_segment(&area->boxes, n);
         if (!cells_show(g, n, box))
             continue;
         area->segments |= UINT64_C(1) << n;
@@ -748,7 +772,9 @@ typedef struct sample {
     vi deviation;        /* its code times 2^WEIGHT_LOG2 TRIP_CPU_DEVIATION_PARTS, if blurred */
     vi deviation_at;     /* offset of the first corner's deviation, if blurred */
     vi sums[4];          /* the integrals at the entry */
-    bool lit, summed;    /* `gradient` is valid; `sums` is valid */
+    vi cell[2];          /* in the grid of rasters; only with pane_segments.sparse */
+    unsigned lit;        /* lanes with a valid `gradient` */
+    bool summed;         /* `sums` is valid */
     int32_t near[2];     /* uneven spacing: start of the search in index_near() */
     wide_position *wide; /* kernels of 64 voxels: position of the sample */
 } sample;
@@ -849,16 +875,19 @@ INLINE vi index_of(const trip_cpu_integrals *in, vi code)
 
 INLINE void sample_at(const trip_cpu_group *g, const trip_cpu_integrals *in, const pane_path *path,
                       const patch_path *area, const stamp_rays *l, unsigned n, bool beyond,
-                      sample *s)
+                      bool sparse, sample *s)
 {
     corners c = corners_at(path, l, n);
     if (beyond && !is_uneven(path))
         move_inside(path, n, &c);
     set_weights(c.part, s);
+    if (sparse)
+        find_cells(g, path, n, &c, s->cell);
     find_codes(g, in, find_positions(g, path, area, n, beyond, &c, s), s);
     if (BLURRED)
         find_deviations(g, s);
-    s->lit = s->summed = false;
+    s->lit = 0;
+    s->summed = false;
 }
 
 #include "cpu/kernels/wide_tmpl.h"
@@ -1124,15 +1153,46 @@ INLINE vf ray_depth(const stamp_rays *l, vf along)
     return v_fma(along, l->depth, l->depth_at_start);
 }
 
-INLINE void find_light(const trip_cpu_sheet_view *view, const trip_cpu_group *g, sample *s)
+#define ALL_LANES UINT32_MAX
+
+/* Makes the squares of open rays at a sample plane, and finds the rays' gradients. */
+static void find_sparse_gradients(const trip_cpu_group *g, unsigned n, vm open, sample *s)
 {
+    const trip_cpu_making *m = g->samples[n].making;
+    int32_t cells[2][V];
+    cell_box box = { { INT32_MAX, INT32_MAX }, { 0, 0 } };
+    for (int a = 0; a < 2; a++)
+        vi_store(cells[a], s->cell[a]);
+    for (unsigned rest = vm_bits(open); rest; rest &= rest - 1)
+        for (int a = 0; a < 2; a++) {
+            const int32_t cell = cells[a][__builtin_ctz(rest)];
+            box.lo[a] = lesser_of(box.lo[a], cell);
+            box.hi[a] = greater_of(box.hi[a], cell);
+        }
+    make_gradients_of_box(g, m, box);
+    /* Another thread may be making the squares of the other rays. These rays read the gradient of
+     * the missing raster. */
+    const vi none = { 0 };
+    find_gradients(g, (vi)v_select(open, (vf)s->gradient_at, (vf)none), s);
+    s->lit = vm_bits(open);
+}
+
+/* Finds the gradients of open rays at a sample plane. If `sparse`, they are made first. */
+INLINE void find_light(const trip_cpu_sheet_view *view, const trip_cpu_group *g, unsigned n,
+                       bool sparse, vm open, sample *s)
+{
+    if (sparse) {
+        if (vm_bits(open) & ~s->lit)
+            find_sparse_gradients(g, n, open, s);
+        return;
+    }
     if (!s->lit && NEAREST)
         find_nearest_gradients(g, s);
     else if (!s->lit && is_wide(g))
         find_wide_gradients(view, g, s);
     else if (!s->lit)
-        find_gradients(g, s);
-    s->lit = true;
+        find_gradients(g, s->gradient_at, s);
+    s->lit = ALL_LANES;
 }
 
 INLINE remnant remnant_of(const trip_cpu_sheet_view *view, const stamp_rays *l,
@@ -1209,7 +1269,8 @@ INLINE void positions_at(const trip_cpu_group *g, const pane_path *path, const s
  * segment is visible in none of the pixels. */
 INLINE bool composite_segment(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
                               const stamp_rays *l, const pane_path *path, unsigned n, bool beyond,
-                              sample *a, sample *b, const remnant *box, vf pixel[CHANNELS])
+                              bool sparse, sample *a, sample *b, const remnant *box,
+                              vf pixel[CHANNELS])
 {
     vm open = vm_and(vm_and(a->there, b->there), v_gt(pixel[3], v_set(0)));
     open = vm_and(open, TRIP_CPU_CLOSED || NEAREST || BLURRED
@@ -1272,8 +1333,8 @@ INLINE bool composite_segment(const trip_cpu_sheet_view *view, const trip_cpu_gr
     if (view->shading) {
         if (NEAREST)
             forget_closed(a, open);
-        find_light(view, g, a);
-        find_light(view, g, b);
+        find_light(view, g, n, sparse, open, a);
+        find_light(view, g, n + 1, sparse, open, b);
         lit = surface_between(view, path, l, way, a, b);
     }
     if (effects) {
@@ -1397,13 +1458,26 @@ INLINE void composite_boxes(const trip_cpu_sheet_view *view, const trip_cpu_grou
         remnant box = next_box(path, n, &w);
         sample s;
         nearest_at(view, g, path, area, n, &w, &box, &s);
-        if (composite_segment(view, g, l, path, n, false, &s, &s, &box, pixel))
+        if (composite_segment(view, g, l, path, n, false, false, &s, &s, &box, pixel))
             finish_terminated(view, pixel);
     }
 }
 
-static void draw_stamp(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
-                       const pane_path *path, pane_segments *passed, const patch_path *area,
+/* Makes the voxels that rays of segment n read: for the patch if rays are sparse, otherwise for the
+ * pane. */
+INLINE void make_for_rays(const trip_cpu_group *g, bool sparse, bool gradients,
+                          pane_segments *passed, patch_path *area, unsigned n)
+{
+    uint64_t *made = sparse ? &area->made : &passed->made;
+    if (*made >> n & 1)
+        return;
+    make_segment(g, gradients && !sparse, box_of_segment(sparse ? &area->boxes : &passed->boxes, n),
+                 n);
+    *made |= UINT64_C(1) << n;
+}
+
+INLINE void draw_stamp(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
+                       const pane_path *path, bool sparse, pane_segments *passed, patch_path *area,
                        const stamp_rays *l, float *stamp)
 {
     uint64_t segments = area->segments;
@@ -1420,10 +1494,7 @@ static void draw_stamp(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
     for (; segments; segments &= segments - 1) {
         unsigned n = (unsigned)__builtin_ctzll(segments), next = n + 1;
         const bool beyond = area->beyond >> n & 1;
-        if (!(passed->made >> n & 1)) {
-            make_segment(g, view->shading, box_of_segment(&passed->boxes, n), n);
-            passed->made |= UINT64_C(1) << n;
-        }
+        make_for_rays(g, sparse, view->shading, passed, area, n);
         if (NEAREST) {
             composite_boxes(view, g, l, path, area, n, pixel);
         } else if (is_wide(g)) {
@@ -1432,11 +1503,11 @@ static void draw_stamp(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
             wide_sample_at(view, g, path, l, next, n, &ends[next % 2]);
         } else {
             if (sampled != n)
-                sample_at(g, view->integrals, path, area, l, n, beyond, &ends[n % 2]);
-            sample_at(g, view->integrals, path, area, l, next, beyond, &ends[next % 2]);
+                sample_at(g, view->integrals, path, area, l, n, beyond, sparse, &ends[n % 2]);
+            sample_at(g, view->integrals, path, area, l, next, beyond, sparse, &ends[next % 2]);
         }
         sampled = next;
-        if (!NEAREST && !composite_segment(view, g, l, path, n, beyond, &ends[n % 2],
+        if (!NEAREST && !composite_segment(view, g, l, path, n, beyond, sparse, &ends[n % 2],
                                            &ends[next % 2], NULL, pixel))
             continue;
         finish_terminated(view, pixel);
@@ -1460,8 +1531,8 @@ INLINE unsigned patch_stamp(unsigned position, unsigned i)
     return (position / 4 * (8 / STAMP_ROWS) + i / 2) * STAMPS_ACROSS + position % 4 * 2 + i % 2;
 }
 
-static void draw_patch(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
-                       const pane_path *path, pane_segments *passed, int x, int y,
+INLINE void draw_patch(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
+                       const pane_path *path, bool sparse, pane_segments *passed, int x, int y,
                        unsigned position, float *pixels)
 {
     bool open = false;
@@ -1474,6 +1545,8 @@ static void draw_patch(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
                y + (int)(position / 4) * 8, &area);
     if (!area.segments)
         return;
+    if (sparse)
+        move_boxes_inside(g, path, &area.boxes);
     for (unsigned i = 0; i < PATCH_STAMPS; i++) {
         unsigned number = patch_stamp(position, i);
         float *stamp = pixels + STAMP_FLOATS * number;
@@ -1484,8 +1557,25 @@ static void draw_patch(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
         if (g->windowed)
             l.along = in_window(g, path, &l);
         if (vm_any(l.along))
-            draw_stamp(view, g, path, passed, &area, &l, stamp);
+            draw_stamp(view, g, path, sparse, passed, &area, &l, stamp);
     }
+}
+
+/* Draws the patches of a pane. Dense rays have a function of their own, so that they cost no extra
+ * instruction. */
+static void draw_patches(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
+                         const pane_path *path, pane_segments *passed, int x, int y, float *pixels)
+{
+    for (unsigned position = 0; position < TRIP_CPU_PANE_PIXELS / 64; position++)
+        draw_patch(view, g, path, false, passed, x, y, position, pixels);
+}
+
+static void draw_sparse_patches(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
+                                const pane_path *path, pane_segments *passed, int x, int y,
+                                float *pixels)
+{
+    for (unsigned position = 0; position < TRIP_CPU_PANE_PIXELS / 64; position++)
+        draw_patch(view, g, path, true, passed, x, y, position, pixels);
 }
 
 static uint64_t sheet_pane(const trip_cpu_sheet_view *view, const trip_cpu_group *g, int x, int y,
@@ -1496,8 +1586,9 @@ static uint64_t sheet_pane(const trip_cpu_sheet_view *view, const trip_cpu_group
     find_path(view, g, x, y, &path);
     pane_segments passed;
     find_segments(view, g, &path, x, y, &passed);
-    for (unsigned position = 0; position < TRIP_CPU_PANE_PIXELS / 64 && passed.some; position++)
-        draw_patch(view, g, &path, &passed, x, y, position, pixels);
+    if (passed.some)
+        (!NEAREST && passed.sparse ? draw_sparse_patches : draw_patches)(view, g, &path, &passed, x,
+                                                                         y, pixels);
     for (unsigned i = 0; i < STAMPS; i++)
         if (stamp_is_open(pixels + STAMP_FLOATS * i))
             open |= UINT64_C(1) << (i / STAMPS_ACROSS * STAMP_ROWS / 4 * 8 + i % STAMPS_ACROSS);

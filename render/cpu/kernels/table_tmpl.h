@@ -85,7 +85,7 @@
         .pane_begin = pane_begin, .pane_blend = pane_blend, .pane_end = pane_end,                  \
         .pane_merge = pane_merge, .pane_finish = pane_finish, .drawn = drawn,                      \
         .reaching = reaching, .sheet_clear = sheet_clear, .sheet_composite = sheet_composite,      \
-        .sheet_ranges = sheet_ranges, .sheet_cells = sheet_cells,                                  \
+        .sheet_decode = sheet_decode, .sheet_ranges = sheet_ranges, .sheet_cells = sheet_cells,    \
         .sheet_gradients = sheet_gradients, .sheet_outlines = sheet_outlines,                      \
         .sheet_between = sheet_between, .sheet_deviations_between = sheet_deviations_between,      \
         .sheet_rows = sheet_rows, .sheet_pane = sheet_pane, .sheet_pane_closed = (closed),         \

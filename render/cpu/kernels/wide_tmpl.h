@@ -140,7 +140,8 @@ static void wide_sample_at(const trip_cpu_sheet_view *view, const trip_cpu_group
     s->deviation = deviation;
     s->there = vi_is_0(lack);
     s->index = index_of(view->integrals, code);
-    s->lit = s->summed = false;
+    s->lit = 0;
+    s->summed = false;
 }
 
 INLINE bool in_the_same_cells(const trip_cpu_group *g, unsigned segment, const sample *s)

@@ -156,10 +156,11 @@ static bool fit_sheets(trip_cpu_sheets *s, const trip_cpu_rasters *all, const tr
     const uint64_t min = need->rasters + s->sample_rasters;
     const uint64_t max = rasters_in(all) * (TRIP_CPU_SHEETS_MAX + TRIP_CPU_SAMPLES_MAX);
     unsigned sheets = TRIP_CPU_SHEETS_MAX;
-    while (sheets > fewest && trip_cpu_store_bytes(all, sheets, 2 * min, s->store.blurs) > room)
+    while (sheets > fewest &&
+           trip_cpu_store_bytes(all, sheets, TRIP_CPU_SAMPLES_MAX, 2 * min, s->store.blurs) > room)
         sheets--;
     s->max = (int)(sheets > fewest + 2 ? sheets - 4 : fewest - 2);
-    return trip_cpu_store_fit(&s->store, all, sheets, min, max, room);
+    return trip_cpu_store_fit(&s->store, all, sheets, TRIP_CPU_SAMPLES_MAX, min, max, room);
 }
 
 int trip_cpu_sheets_about(const trip_frame *frame)

@@ -9,8 +9,8 @@
  * more sheets open more squares. */
 enum { SHEETS = 8 };
 
-/* Edge of a patch in pixels, and of a pane in patches. */
-enum { PATCH = 8, ACROSS = TRIP_CPU_PANE / PATCH };
+/* Edge of a texel in pixels, and of a pane in texels. */
+enum { TEXEL = 4, ACROSS = TRIP_CPU_PANE / TEXEL };
 
 /* A bound of the error of ray positions in single precision. */
 #define SLACK_VOXELS 0.125
@@ -33,7 +33,7 @@ static void include(bounds *b, int a, double at)
     b->max[a] = at > b->max[a] ? at : b->max[a];
 }
 
-/* The rays at the corners of a pane's patches. */
+/* The rays at the corners of a pane's texels. */
 enum { CORNERS = ACROSS + 1 };
 typedef struct pane_rays {
     bool along[CORNERS * CORNERS];      /* the ray goes in the direction of the pass */
@@ -94,7 +94,7 @@ static void open_squares(trip_cpu_store *s, const bounds *b, int reach)
 }
 
 /* Opens the squares for rays between four corners. `first` is the first corner; the corners are
- * `step` patches apart. If only some of the four rays go in the pass's direction, rays between them
+ * `step` texels apart. If only some of the four rays go in the pass's direction, rays between them
  * may have any slope. */
 static void open_rectangle(trip_cpu_sheets *s, const extent *e, const pane_rays *rays, int first,
                            int step)
@@ -116,11 +116,18 @@ static void open_rectangle(trip_cpu_sheets *s, const extent *e, const pane_rays 
         open_squares(&s->store, &b, e->reach);
 }
 
-/* Returns whether a texel in patch i of the pane is open. */
-static bool patch_is_open(uint64_t texels, int i)
+/* Opens the squares for a patch of 2 x 2 texels: for the whole patch, or for each open texel. */
+static void open_patch(trip_cpu_sheets *s, const extent *e, const pane_rays *rays, int u, int v,
+                       uint64_t texels)
 {
-    static_assert(PATCH == 8 && ACROSS == 4, "two by two texels of 4 x 4 pixels");
-    return texels >> (i / ACROSS * 16 + i % ACROSS * 2) & 0x303;
+    static_assert(ACROSS == 8, "a byte for a row of texels");
+    const uint64_t open = texels >> (v * ACROSS + u) & 0x303;
+    const int first = v * CORNERS + u;
+    if (open == 0x303)
+        open_rectangle(s, e, rays, first, 2);
+    for (int i = 0; i < 4 && open != 0x303; i++)
+        if (open >> (i / 2 * ACROSS + i % 2) & 1)
+            open_rectangle(s, e, rays, first + i / 2 * CORNERS + i % 2, 1);
 }
 
 static void open_pane(trip_cpu_sheets *s, const extent *e, uint32_t pane, uint64_t texels)
@@ -130,12 +137,11 @@ static void open_pane(trip_cpu_sheets *s, const extent *e, uint32_t pane, uint64
     pane_rays rays;
     for (int i = 0; i < CORNERS * CORNERS; i++)
         if (!whole || (i % CORNERS % ACROSS == 0 && i / CORNERS % ACROSS == 0))
-            find_ray(&s->view, e, x + i % CORNERS * PATCH, y + i / CORNERS * PATCH, i, &rays);
+            find_ray(&s->view, e, x + i % CORNERS * TEXEL, y + i / CORNERS * TEXEL, i, &rays);
     if (whole)
         open_rectangle(s, e, &rays, 0, ACROSS);
-    for (int i = 0; i < ACROSS * ACROSS && !whole; i++)
-        if (patch_is_open(texels, i))
-            open_rectangle(s, e, &rays, i / ACROSS * CORNERS + i % ACROSS, 1);
+    for (int i = 0; i < ACROSS * ACROSS / 4 && !whole; i++)
+        open_patch(s, e, &rays, i % (ACROSS / 2) * 2, i / (ACROSS / 2) * 2, texels);
 }
 
 static uint64_t open_texels(const trip_cpu *r, uint32_t pane)

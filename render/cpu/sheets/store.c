@@ -64,13 +64,10 @@ static bool take_voxels(trip_cpu_store *s, uint64_t min, uint64_t wanted)
     return s->voxels != NULL;
 }
 
-/* Lays out a sheet's arrays for making on demand. Returns the offset behind them. */
-static size_t lay_out_making(trip_cpu_sheet *sheet, char *memory, size_t at, size_t grid)
+static size_t lay_out_on_demand(trip_cpu_on_demand *d, char *memory, size_t at, size_t grid)
 {
-    trip_cpu_making *m = &sheet->making;
-    m->rasters = sheet->rasters;
-    m->begun = trip_cpu_take_array(memory, &at, grid * sizeof *m->begun);
-    m->made = trip_cpu_take_array(memory, &at, grid * sizeof *m->made);
+    d->begun = trip_cpu_take_array(memory, &at, grid * sizeof *d->begun);
+    d->made = trip_cpu_take_array(memory, &at, grid * sizeof *d->made);
     return at;
 }
 
@@ -88,12 +85,15 @@ static size_t lay_out(trip_cpu_store *s, char *memory)
         if (s->blurs)
             sheet->rows = trip_cpu_take_array(memory, &at, grid * sizeof *sheet->rows);
         sheet->needed = trip_cpu_take_array(memory, &at, grid * sizeof *sheet->needed);
-        at = lay_out_making(sheet, memory, at, grid);
+        sheet->making.rasters = sheet->rasters;
+        at = lay_out_on_demand(&sheet->making.gradients, memory, at, grid);
     }
-    for (int i = 0; i < TRIP_CPU_SAMPLES_MAX; i++) {
+    for (unsigned i = 0; i < s->sample_room; i++) {
         trip_cpu_sheet *sample = &s->samples[i];
         sample->rasters = trip_cpu_take_array(memory, &at, grid * sizeof *sample->rasters);
-        at = lay_out_making(sample, memory, at, grid);
+        sample->making.rasters = sample->rasters;
+        at = lay_out_on_demand(&sample->making.codes, memory, at, grid);
+        at = lay_out_on_demand(&sample->making.gradients, memory, at, grid);
     }
     s->some = trip_cpu_take_array(memory, &at, grid * sizeof *s->some);
     s->open = trip_cpu_take_array(memory, &at, grid * sizeof *s->open);
@@ -149,17 +149,18 @@ void trip_cpu_store_move(trip_cpu_store *s, const trip_cpu_rasters *to)
     trip_cpu_store_clear(s, 0);
 }
 
-static uint64_t grid_bytes(const trip_cpu_rasters *all, unsigned sheets, bool blurs)
+static uint64_t grid_bytes(const trip_cpu_rasters *all, unsigned sheets, unsigned samples,
+                           bool blurs)
 {
-    trip_cpu_store of = { .sheet_room = sheets, .blurs = blurs };
+    trip_cpu_store of = { .sheet_room = sheets, .sample_room = samples, .blurs = blurs };
     set_grid(&of, all);
     return lay_out(&of, NULL);
 }
 
-uint64_t trip_cpu_store_bytes(const trip_cpu_rasters *all, unsigned sheets, uint64_t rasters,
-                              bool blurs)
+uint64_t trip_cpu_store_bytes(const trip_cpu_rasters *all, unsigned sheets, unsigned samples,
+                              uint64_t rasters, bool blurs)
 {
-    uint64_t grids = has_grid(all) ? grid_bytes(all, sheets, blurs) : UINT64_MAX / 2;
+    uint64_t grids = has_grid(all) ? grid_bytes(all, sheets, samples, blurs) : UINT64_MAX / 2;
     return grids + (rasters + 1) * (raster_bytes(blurs) + sizeof(int32_t));
 }
 
@@ -169,15 +170,18 @@ uint64_t trip_cpu_store_held_bytes(const trip_cpu_store *s)
 }
 
 bool trip_cpu_store_fit(trip_cpu_store *s, const trip_cpu_rasters *all, unsigned sheets,
-                        uint64_t min, uint64_t max, uint64_t room)
+                        unsigned samples, uint64_t min, uint64_t max, uint64_t room)
 {
     const uint64_t greatest = TRIP_CPU_RASTERS_MAX - 1;
-    if (min > greatest || !has_grid(all) || trip_cpu_store_bytes(all, sheets, min, s->blurs) > room)
+    if (min > greatest || !has_grid(all) ||
+        trip_cpu_store_bytes(all, sheets, samples, min, s->blurs) > room)
         return false;
     max = max < greatest ? max : greatest;
-    uint64_t fit =
-        (room - grid_bytes(all, sheets, s->blurs)) / (raster_bytes(s->blurs) + sizeof *s->free) - 1;
+    uint64_t fit = (room - grid_bytes(all, sheets, samples, s->blurs)) /
+                       (raster_bytes(s->blurs) + sizeof *s->free) -
+                   1;
     s->sheet_room = sheets;
+    s->sample_room = samples;
     set_grid(s, all);
     if (s->rasters > fit + 1)
         release_voxels(s);
@@ -187,6 +191,15 @@ bool trip_cpu_store_fit(trip_cpu_store *s, const trip_cpu_rasters *all, unsigned
     return true;
 }
 
+/* Lets threads make all squares of a raster. */
+static void forget_made(const trip_cpu_on_demand *d, size_t at)
+{
+    if (!d->begun)
+        return;
+    atomic_store_explicit(&d->begun[at], 0, memory_order_relaxed);
+    atomic_store_explicit(&d->made[at], 0, memory_order_relaxed);
+}
+
 bool trip_cpu_store_take(trip_cpu_store *s, trip_cpu_sheet *sheet, size_t at)
 {
     if (s->free_count == 0)
@@ -194,8 +207,8 @@ bool trip_cpu_store_take(trip_cpu_store *s, trip_cpu_sheet *sheet, size_t at)
     sheet->rasters[at] = s->free[--s->free_count];
     if (sheet->filled)
         atomic_store_explicit(&sheet->filled[at], 0, memory_order_relaxed);
-    atomic_store_explicit(&sheet->making.begun[at], 0, memory_order_relaxed);
-    atomic_store_explicit(&sheet->making.made[at], 0, memory_order_relaxed);
+    forget_made(&sheet->making.codes, at);
+    forget_made(&sheet->making.gradients, at);
     return true;
 }
 
@@ -218,21 +231,9 @@ void trip_cpu_store_drop(trip_cpu_store *s, trip_cpu_sheet *sheet)
 
 /* ---- from a run to voxels ---- */
 
-/* Offset of a square's voxel in a raster from the square's first voxel, by Morton number n. */
-#define PLACE(n)                                                                                   \
-    ((((n) >> 1 & 1) | ((n) >> 2 & 2) | ((n) >> 3 & 4)) * TRIP_CPU_RASTER_STRIDE +                 \
-     (((n)&1) | ((n) >> 1 & 2) | ((n) >> 2 & 4)))
-#define PLACES4(n) PLACE(n), PLACE((n) + 1), PLACE((n) + 2), PLACE((n) + 3)
-#define PLACES16(n) PLACES4(n), PLACES4((n) + 4), PLACES4((n) + 8), PLACES4((n) + 12)
-
-static const uint16_t positions[64] = { PLACES16(0), PLACES16(16), PLACES16(32), PLACES16(48) };
-
-/* Writes the draw codes of a square's records, stretched and biased. The local arrays cannot alias,
- * so the compiler vectorises the loops. */
-static void square_codes(const trip_cpu_store *s, const trip_square *at, int16_t out[64])
+/* Writes the draw codes of a square's records, stretched. */
+static void square_codes(const trip_cpu_store *s, const trip_square *at, uint16_t codes[64])
 {
-    uint16_t codes[64];
-    int16_t biased[64];
     const uint32_t count = at->count;
     const trip_cpu_codes stretch = s->codes;
     trip_square_codes(at, codes);
@@ -242,23 +243,6 @@ static void square_codes(const trip_cpu_store *s, const trip_square *at, int16_t
     if (stretch.shift > 0)
         for (uint32_t i = 0; i < count; i++)
             codes[i] = trip_cpu_code(stretch, codes[i]);
-    for (uint32_t i = 0; i < count; i++)
-        biased[i] = (int16_t)((codes[i] + (codes[i] == 0)) ^ TRIP_CPU_CODE_BIAS);
-    memcpy(out, biased, sizeof *out * count);
-}
-
-static void decode_square(const trip_cpu_store *s, int16_t *to, const trip_square *at)
-{
-    int16_t codes[64];
-    const int16_t *next = codes;
-    square_codes(s, at, codes);
-    if (at->mask == UINT64_MAX) { /* each pair of voxels is adjacent in a row */
-        for (unsigned i = 0; i < 64; i += 2)
-            memcpy(to + positions[i], codes + i, 2 * sizeof *codes);
-        return;
-    }
-    for (uint64_t rest = at->mask; rest; rest &= rest - 1)
-        to[positions[__builtin_ctzll(rest)]] = *next++;
 }
 
 /* Writes the deviations of a square's records, which begin at `from`. */
@@ -270,7 +254,7 @@ static void decode_deviations(const trip_cpu_store *s, int16_t *to, const trip_s
     if (s->draw->of_stored)
         trip_square_codes(at, codes);
     for (uint64_t rest = at->mask; rest; rest &= rest - 1, n++) {
-        int16_t *d = &to[positions[__builtin_ctzll(rest)]];
+        int16_t *d = &to[trip_cpu_places[__builtin_ctzll(rest)]];
         *d = (int16_t)(from[n] * TRIP_CPU_DEVIATION_PARTS);
         if (s->draw->of_stored)
             *d = (int16_t)lrint(trip_draw_deviation(s->draw, codes[n], from[n]) *
@@ -284,11 +268,21 @@ static bool is_within(const trip_cpu_store *s, int64_t u, int64_t v)
            v < s->first_v + s->down;
 }
 
+/* Adds squares of a raster to those with voxels. */
+static void add_filled(const trip_cpu_sheet *sheet, size_t at, uint64_t squares)
+{
+    if (squares)
+        atomic_fetch_or_explicit(&sheet->filled[at], squares, memory_order_relaxed);
+}
+
 void trip_cpu_store_decode(const trip_cpu_store *s, const trip_cpu_sheet *sheet,
                            const trip_block *block, const trip_run *run)
 {
     trip_square squares[TRIP_BLOCK_SQUARES_MAX];
     const uint32_t count = trip_block_squares(block, squares);
+    uint16_t codes[64 + 32] = { 0 };
+    uint64_t filled = 0; /* squares of raster `last`; an atomic step waits for all stores */
+    size_t last = 0;
     for (const trip_square *square = squares; square < squares + count; square++) {
         int u = run->u + 8 * trip_cpu_square_u(square->number);
         int v = run->v + 8 * trip_cpu_square_v(square->number);
@@ -302,12 +296,17 @@ void trip_cpu_store_decode(const trip_cpu_store *s, const trip_cpu_sheet *sheet,
         if (!sheet->rasters[at] || !(s->open[at] & bit))
             continue;
         const int first = v * TRIP_CPU_RASTER_STRIDE + u;
-        decode_square(s, s->voxels[sheet->rasters[at]].codes + first, square);
+        square_codes(s, square, codes);
+        s->kernels->sheet_decode(codes, square->mask, s->voxels[sheet->rasters[at]].codes + first);
         if (s->blurs && block->deviations)
             decode_deviations(s, s->deviations[sheet->rasters[at]] + first, square,
                               block->deviations + square->first);
-        atomic_fetch_or_explicit(&sheet->filled[at], bit, memory_order_relaxed);
+        if (at != last)
+            add_filled(sheet, last, filled);
+        filled = (at != last ? 0 : filled) | bit;
+        last = at;
     }
+    add_filled(sheet, last, filled);
 }
 
 /* ---- neighbours and visibility ---- */
@@ -317,6 +316,7 @@ typedef struct work_job {
     trip_cpu_store *store;
     const trip_cpu_sheet_work *work;
     const trip_cpu_tf *function;
+    bool either; /* also for rasters that only `other` has */
     /* Called for each present raster. */
     void (*each)(const struct work_job *job, const trip_cpu_sheet_work *w, size_t at);
 } work_job;
@@ -332,7 +332,7 @@ static void work_row(void *context, unsigned task, unsigned thread)
         return;
     for (int32_t u = 1; u < s->across - 1; u++) {
         size_t at = (size_t)(task % rows + 1) * (size_t)s->across + (size_t)u;
-        if (w->sheet->rasters[at])
+        if (w->sheet->rasters[at] || (job->either && w->other->rasters[at]))
             job->each(job, w, at);
     }
 }
@@ -408,11 +408,17 @@ static void copy_gradients_beside(const work_job *job, const trip_cpu_sheet_work
     last[TRIP_CPU_RASTER] = raster_at(s, w->sheet, at + across + 1)->gradients[0];
 }
 
+/* Returns the squares with voxels of a present raster. All other squares have an empty range. */
+static uint64_t filled_in(const trip_cpu_sheet *sheet, size_t at)
+{
+    return atomic_load_explicit(&sheet->filled[at], memory_order_relaxed);
+}
+
 static void find_ranges(const work_job *job, const trip_cpu_sheet_work *w, size_t at)
 {
     const trip_cpu_store *s = job->store;
     copy_codes_beside(job, w, at);
-    const uint64_t filled = atomic_load_explicit(&w->sheet->filled[at], memory_order_relaxed);
+    const uint64_t filled = filled_in(w->sheet, at);
     s->kernels->sheet_ranges(raster_at(s, w->sheet, at), filled, &w->sheet->ranges[at]);
     if (s->blurs)
         find_rows(s, w->sheet, at, filled);
@@ -611,7 +617,9 @@ static void find_visible(const work_job *job, const trip_cpu_sheet_work *w, size
     const bool blurs = job->store->blurs;
     uint8_t rows[64];
     if (w->other->rasters[at])
-        for (int i = 0; i < 64; i++) {
+        for (uint64_t rest = filled_in(w->sheet, at) & filled_in(w->other, at); rest;
+             rest &= rest - 1) {
+            const int i = __builtin_ctzll(rest);
             bool any = a->min[i] <= a->max[i] && b->min[i] <= b->max[i];
             int16_t min = a->min[i] < b->min[i] ? a->min[i] : b->min[i];
             int16_t max = a->max[i] > b->max[i] ? a->max[i] : b->max[i];
@@ -645,9 +653,9 @@ static uint64_t beside(const trip_cpu_edges *e, int edge)
            ((behind[edge] & behind[TRIP_CPU_LEFT]) << 7 & TRIP_CPU_COLUMN_7);
 }
 
-/* Finds the squares from which visible segments read voxels. Outermost rasters have no visible
- * squares, so their edges are empty. With uneven spacing a segment may cross any number of squares,
- * so all are needed. */
+/* Finds the squares from which visible segments read voxels, in either sheet. Outermost rasters
+ * have no visible squares, so their edges are empty. With uneven spacing a segment may cross any
+ * number of squares, so all are needed. */
 static void find_needed(const work_job *job, const trip_cpu_sheet_work *w, size_t at)
 {
     const trip_cpu_edges *e = &w->sheet->edges[at];
@@ -663,7 +671,7 @@ void trip_cpu_store_find_visible(trip_cpu_store *s, const trip_cpu_sheet_work *w
                                  const trip_cpu_tf *f)
 {
     run_work(&(work_job){ .store = s, .work = work, .function = f, .each = find_visible }, count);
-    run_work(&(work_job){ .store = s, .work = work, .each = find_needed }, count);
+    run_work(&(work_job){ .store = s, .work = work, .either = true, .each = find_needed }, count);
 }
 
 static void find_gradients(const work_job *job, const trip_cpu_sheet_work *w, size_t at)
@@ -726,7 +734,9 @@ static void cut_raster(const work_job *job, const trip_cpu_sheet_work *w, size_t
 {
     const trip_cpu_store *s = job->store;
     s->kernels->sheet_between(raster_at(s, w->other, at), raster_at(s, w->third, at), UINT64_MAX,
-                              w->sheet->making.weights, w->other->shaded,
+                              w->sheet->making.weights,
+                              TRIP_CPU_PART_CODES |
+                                  (w->other->shaded ? TRIP_CPU_PART_GRADIENTS : 0),
                               raster_at(s, w->sheet, at));
     if (s->blurs)
         s->kernels->sheet_deviations_between(

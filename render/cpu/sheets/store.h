@@ -75,22 +75,22 @@ typedef struct trip_cpu_store {
     int32_t across, down;
     char *grids; /* memory of the arrays below */
     size_t grids_bytes;
-    unsigned sheet_room; /* number of sheets with memory */
+    unsigned sheet_room, sample_room; /* number of sheets and of sample planes with memory */
     trip_cpu_sheet sheets[TRIP_CPU_SHEETS_MAX], samples[TRIP_CPU_SAMPLES_MAX];
     uint64_t *some; /* squares visible in any segment of the group */
     uint64_t *open; /* squares to decode in the current sheet; at first all */
 } trip_cpu_store;
 
-/* Returns the bytes of `sheets` sheets of a rectangle, with a pool of `rasters` rasters. They have
- * deviations if `blurs`. */
-uint64_t trip_cpu_store_bytes(const trip_cpu_rasters *all, unsigned sheets, uint64_t rasters,
-                              bool blurs);
+/* Returns the bytes of sheets and sample planes of a rectangle, with a pool of `rasters` rasters.
+ * Rasters have deviations if `blurs`. */
+uint64_t trip_cpu_store_bytes(const trip_cpu_rasters *all, unsigned sheets, unsigned samples,
+                              uint64_t rasters, bool blurs);
 /* Returns the bytes that the store holds from the budget. */
 uint64_t trip_cpu_store_held_bytes(const trip_cpu_store *s);
-/* Makes room for `sheets` sheets of a rectangle and for `min` to `max` rasters, in at most `room`
- * bytes. All sheets are empty afterwards. Returns false if `room` is too small. */
+/* Makes room for sheets and sample planes of a rectangle and for `min` to `max` rasters, in at most
+ * `room` bytes. All sheets are empty afterwards. Returns false if `room` is too small. */
 bool trip_cpu_store_fit(trip_cpu_store *s, const trip_cpu_rasters *all, unsigned sheets,
-                        uint64_t min, uint64_t max, uint64_t room);
+                        unsigned samples, uint64_t min, uint64_t max, uint64_t room);
 /* Moves the grid to a rectangle that is no larger than the one of trip_cpu_store_fit(). Empties all
  * sheets. */
 void trip_cpu_store_move(trip_cpu_store *s, const trip_cpu_rasters *to);

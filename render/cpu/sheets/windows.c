@@ -41,8 +41,8 @@ static uint64_t bytes_of(const trip_cpu_rasters *all, const int64_t size[2], int
                          int sheets, int samples_per_sheet, bool blurs)
 {
     trip_cpu_rasters b = held_rasters(all, size, reach);
-    return trip_cpu_store_bytes(&b, (unsigned)sheets, rasters_of(&b, sheets + samples_per_sheet),
-                                blurs);
+    return trip_cpu_store_bytes(&b, (unsigned)sheets, (unsigned)samples_per_sheet,
+                                rasters_of(&b, sheets + samples_per_sheet), blurs);
 }
 
 static uint64_t kept_bytes(const trip_cpu_need *need, int sheets)
@@ -105,7 +105,8 @@ bool trip_cpu_windows_fit(trip_cpu_sheets *s, const trip_cpu_rasters *all, int64
     trip_cpu_rasters hand = held_rasters(all, w->size, reach);
     uint64_t rasters = rasters_of(&hand, sheets + samples_per_sheet);
     w->used = take_runs(w, need, s->store.budget) &&
-              trip_cpu_store_fit(&s->store, &hand, (unsigned)sheets, rasters, rasters, room - kept);
+              trip_cpu_store_fit(&s->store, &hand, (unsigned)sheets, (unsigned)samples_per_sheet,
+                                 rasters, rasters, room - kept);
     return w->used;
 }
 
