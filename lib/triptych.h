@@ -550,6 +550,30 @@ typedef struct triptych_clip {
     double plane[6][4];
 } triptych_clip;
 
+/* The order in which the Gaussians of a scene are drawn. */
+typedef enum triptych_order {
+    TRIPTYCH_ORDER_DEFAULT, /* depth */
+    TRIPTYCH_ORDER_DEPTH,   /* by the depth of their centres, as scenes are trained */
+    /* By their coordinates along X, Y and Z. The layers of the three lists are blended. Nothing is
+     * sorted, and nothing pops when the view turns. */
+    TRIPTYCH_ORDER_LISTS,
+} triptych_order;
+
+/* The highest degree of the spherical harmonics of a scene that are read and drawn. */
+typedef enum triptych_harmonics {
+    TRIPTYCH_HARMONICS_DEFAULT, /* all that the scene has */
+    TRIPTYCH_HARMONICS_0,
+    TRIPTYCH_HARMONICS_1,
+    TRIPTYCH_HARMONICS_2,
+    TRIPTYCH_HARMONICS_3,
+} triptych_harmonics;
+
+/* Settings of Gaussian scenes. */
+typedef struct triptych_scene_settings {
+    triptych_order order;
+    triptych_harmonics harmonics;
+} triptych_scene_settings;
+
 /* The settings of a picture. NULL selects the defaults of a group. */
 typedef struct triptych_settings {
     triptych_quality quality;
@@ -581,6 +605,7 @@ typedef struct triptych_settings {
     const double *background;
     const triptych_splat_settings *splat;
     const triptych_sheet_settings *sheet;
+    const triptych_scene_settings *scene;
     const triptych_integral_settings *integral;
     const triptych_lod_settings *lod;
     const triptych_light *light;
