@@ -165,6 +165,9 @@ static double ply_count(const char *head, const char *element)
     return at && sscanf(at + strlen(line), "%lf", &count) == 1 ? count : -1;
 }
 
+/* The end of the line for scenes that trip_gaussian_file_open() reads. */
+#define DESCRIBED "; `triptych info FILE` describes it"
+
 /* Tells meshes, points and Gaussian splats apart by the header. */
 static bool tell_ply(const file *f)
 {
@@ -179,8 +182,8 @@ static bool tell_ply(const file *f)
     if (end)
         *end = 0;
     const double points = ply_count(head, "vertex");
-    if (strstr(head, " scale_0") && strstr(head, " rot_0"))
-        SAY("is a scene of %.0f Gaussian splats (PLY), not a volume; SuperSplat opens it", points);
+    if (strstr(head, " scale_0") || strstr(head, " rot_0") || strstr(head, " f_dc_0"))
+        SAY("is a scene of %.0f Gaussian splats (PLY), not a volume" DESCRIBED, points);
     else if (strstr(head, "\nelement chunk ") && strstr(head, "packed_position"))
         SAY("is a compressed scene of Gaussian splats (PLY), not a volume; SuperSplat opens it");
     else if (ply_count(head, "face") > 0 || ply_count(head, "tristrips") > 0)
