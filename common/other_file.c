@@ -69,6 +69,9 @@ static bool is_text(const file *f)
 
 /* ---- formats with a mark at a fixed place ---- */
 
+/* The end of the line for scenes that trip_gaussian_file_open() reads. */
+#define DESCRIBED "; `triptych info FILE` describes it"
+
 typedef struct mark {
     size_t at;
     const char *bytes;
@@ -104,7 +107,7 @@ static const mark marks[] = {
     MARK(0, "glTF", "is a glTF scene of meshes, not a volume; Blender opens it"),
     MARK(0, "LASF", "is a LAS or LAZ file of points, not a volume; CloudCompare opens it"),
     MARK(0, "ASTM-E57", "is an E57 file of scanned points, not a volume; CloudCompare opens it"),
-    MARK(0, "NGSP", "is a scene of Gaussian splats (SPZ), not a volume; SuperSplat opens it"),
+    MARK(0, "NGSP", "is a scene of Gaussian splats (SPZ), not a volume" DESCRIBED),
     MARK(0, "\xff\xd8\xff",
          "is a JPEG picture; TIFF, PNG and EXR are read: ImageMagick converts it "
          "with `convert FILE FILE.png`"),
@@ -164,9 +167,6 @@ static double ply_count(const char *head, const char *element)
     const char *at = strstr(head, line);
     return at && sscanf(at + strlen(line), "%lf", &count) == 1 ? count : -1;
 }
-
-/* The end of the line for scenes that trip_gaussian_file_open() reads. */
-#define DESCRIBED "; `triptych info FILE` describes it"
 
 /* Tells meshes, points and Gaussian splats apart by the header. */
 static bool tell_ply(const file *f)
@@ -546,7 +546,7 @@ static bool tell_name(const file *f)
     static const struct {
         const char *suffix, *text;
     } names[] = {
-        { ".splat", "is a scene of Gaussian splats (.splat), not a volume; SuperSplat opens it" },
+        { ".splat", "is a scene of Gaussian splats (.splat), not a volume" DESCRIBED },
         { ".ksplat", "is a scene of Gaussian splats (.ksplat), not a volume; SuperSplat opens it" },
         { ".3ds", "is a mesh (3DS), not a volume; Blender or MeshLab opens it" },
         { ".fbx", "is a scene of meshes (FBX), not a volume; Blender opens it" },

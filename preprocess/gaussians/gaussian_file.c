@@ -13,7 +13,7 @@
 enum { HEAD_BYTES = 1 << 18 };
 
 static const trip_gaussian_reader *const readers[] = {
-    &trip_read_gaussian_ply,
+    &trip_read_gaussian_ply, &trip_read_spz, &trip_read_splat, /* has no magic number */
 };
 
 bool trip_gaussian_suffix(const char *path, const char *suffix)
@@ -30,6 +30,16 @@ bool trip_gaussian_suffix(const char *path, const char *suffix)
 int trip_gaussian_no_memory(const trip_gaussian_file *f)
 {
     return trip_fail(TRIP_ERROR, "read", f->path, "out of memory");
+}
+
+int trip_gaussian_check_plain(const trip_gaussian_file *f)
+{
+    const char *program = trip_byte_encoding_name(trip_byte_encoding_of(f->path));
+    return *program ? trip_fail(TRIP_ERROR, "read", f->path,
+                                "is compressed with %s, and its format (%s) can only be read "
+                                "unpacked: unpack it first, with `%s -dc FILE >NAME`",
+                                program, f->info.format, program)
+                    : 0;
 }
 
 /* Sets *out to the reader of a file, or to NULL. */

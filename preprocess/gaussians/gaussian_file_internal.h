@@ -32,7 +32,7 @@ struct trip_gaussian_file {
     bool warned;
 };
 
-extern const trip_gaussian_reader trip_read_gaussian_ply;
+extern const trip_gaussian_reader trip_read_gaussian_ply, trip_read_spz, trip_read_splat;
 
 /* Constant term of the spherical harmonics: 1 / (2 sqrt(pi)). */
 #define TRIP_SH_CONSTANT 0.28209479177387814
@@ -50,6 +50,9 @@ static inline float trip_sh_of_colour(double colour)
 
 /* Returns whether a file name ends in a suffix, also before ".gz" or ".bz2". */
 bool trip_gaussian_suffix(const char *path, const char *suffix);
+
+/* Fails for a compressed file, of a format that is read in parts or by its size. */
+int trip_gaussian_check_plain(const trip_gaussian_file *f);
 
 /* Reports that memory is exhausted. */
 int trip_gaussian_no_memory(const trip_gaussian_file *f);
