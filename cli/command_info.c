@@ -11,6 +11,7 @@
 #include "budget.h"
 #include "cached_volume.h"
 #include "draw_options.h"
+#include "gaussian_info_print.h"
 #include "geometry.h"
 #include "json.h"
 #include "library.h"
@@ -566,8 +567,10 @@ int trip_command_info(int argc, char **argv)
     const command_line c = {
         .args_doc = "NAME.trip|VOLUME",
         .doc = "Prints the contents of a data set: grid, values, sizes and source. Of a volume, it "
-               "prints the grid, a look at the values, and the series of a DICOM folder. Of other "
-               "files, it prints what they are and what reads them.",
+               "prints the grid, a look at the values, and the series of a DICOM folder. Of a "
+               "Gaussian "
+               "scene, it prints count, degree and bounds. Of other files, it prints what they are "
+               "and what reads them.",
         .sets = p.sets,
         .set_count = SETS,
         .argument = add_input,
@@ -582,6 +585,8 @@ int trip_command_info(int argc, char **argv)
         status = library_create(&d.t, NULL);
     if (own)
         status = own_file_info(o.path, o.json != 0);
+    else if (status == 0 && gaussian_info_wanted(d.t, o.path))
+        status = gaussian_info_print(d.t, o.path, p.sets[VOLUME].given, o.json != 0);
     else if (status == 0)
         status = cached_volume_wanted(o.path)
                      ? volume_info_print(d.t, o.path, &o.volume, o.json != 0)

@@ -69,6 +69,9 @@ static bool is_text(const file *f)
 
 /* ---- formats with a mark at a fixed place ---- */
 
+/* The end of the line for scenes that trip_gaussian_file_open() reads. */
+#define DESCRIBED "; `triptych info FILE` describes it"
+
 typedef struct mark {
     size_t at;
     const char *bytes;
@@ -104,7 +107,7 @@ static const mark marks[] = {
     MARK(0, "glTF", "is a glTF scene of meshes, not a volume; Blender opens it"),
     MARK(0, "LASF", "is a LAS or LAZ file of points, not a volume; CloudCompare opens it"),
     MARK(0, "ASTM-E57", "is an E57 file of scanned points, not a volume; CloudCompare opens it"),
-    MARK(0, "NGSP", "is a scene of Gaussian splats (SPZ), not a volume; SuperSplat opens it"),
+    MARK(0, "NGSP", "is a scene of Gaussian splats (SPZ), not a volume" DESCRIBED),
     MARK(0, "\xff\xd8\xff",
          "is a JPEG picture; TIFF, PNG and EXR are read: ImageMagick converts it "
          "with `convert FILE FILE.png`"),
@@ -179,8 +182,8 @@ static bool tell_ply(const file *f)
     if (end)
         *end = 0;
     const double points = ply_count(head, "vertex");
-    if (strstr(head, " scale_0") && strstr(head, " rot_0"))
-        SAY("is a scene of %.0f Gaussian splats (PLY), not a volume; SuperSplat opens it", points);
+    if (strstr(head, " scale_0") || strstr(head, " rot_0") || strstr(head, " f_dc_0"))
+        SAY("is a scene of %.0f Gaussian splats (PLY), not a volume" DESCRIBED, points);
     else if (strstr(head, "\nelement chunk ") && strstr(head, "packed_position"))
         SAY("is a compressed scene of Gaussian splats (PLY), not a volume; SuperSplat opens it");
     else if (ply_count(head, "face") > 0 || ply_count(head, "tristrips") > 0)
@@ -543,7 +546,7 @@ static bool tell_name(const file *f)
     static const struct {
         const char *suffix, *text;
     } names[] = {
-        { ".splat", "is a scene of Gaussian splats (.splat), not a volume; SuperSplat opens it" },
+        { ".splat", "is a scene of Gaussian splats (.splat), not a volume" DESCRIBED },
         { ".ksplat", "is a scene of Gaussian splats (.ksplat), not a volume; SuperSplat opens it" },
         { ".3ds", "is a mesh (3DS), not a volume; Blender or MeshLab opens it" },
         { ".fbx", "is a scene of meshes (FBX), not a volume; Blender opens it" },
