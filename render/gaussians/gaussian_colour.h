@@ -5,8 +5,7 @@
 
 #include <math.h>
 
-#include "gaussian.h"
-#include "geometry.h"
+#include "gaussian_picture.h"
 
 /* Computes the values of the first trip_sh_count(degree) harmonics for a direction of unit length.
  * The signs are those of Kerbl et al. 2023. */
@@ -43,7 +42,7 @@ static inline void trip_sh_basis(int degree, trip_vec3 d, double basis[TRIP_SH_M
 }
 
 /* Computes the display colour seen along a direction of unit length in scene space, from the eye to
- * the centre. Values have the minimum 0 and no maximum. */
+ * the centre. Values lie from 0 to TRIP_GAUSSIAN_COLOUR_MAX. */
 static inline void trip_gaussian_colour(const trip_gaussian *g, int degree, trip_vec3 direction,
                                         double rgb[3])
 {
@@ -53,7 +52,7 @@ static inline void trip_gaussian_colour(const trip_gaussian *g, int degree, trip
         double sum = 0.5;
         for (int i = 0; i < trip_sh_count(degree); i++)
             sum += basis[i] * (double)g->sh[i][c];
-        rgb[c] = fmax(0, sum);
+        rgb[c] = fmin(TRIP_GAUSSIAN_COLOUR_MAX, fmax(0, sum));
     }
 }
 

@@ -17,9 +17,15 @@
  *     alpha(p) = min(0.99, o' exp(-q / 2)),  q = d^T S2^-1 d,  d = p - (X, Y)
  * An alpha below 1/255 counts as 0. No other bound cuts the footprint off.
  *
- * With the exact footprint, q is the squared distance of the centre from the ray through p, in
- * standard deviations: the minimum along the ray. It has no low-pass filter. A Gaussian with a
- * deviation of 0 is a flat ellipse, and q belongs to the point where the ray meets its plane.
+ * With the exact footprint, J is not limited. Let R and s be the rotation and the deviations, r(p)
+ * the ray through p, and V = diag(s2 s3, s1 s3, s1 s2) R^T. Then
+ *     q = d^T S2^-1 d |V r(X, Y)|^2 / |V r(p)|^2,
+ * and alpha is 0 where V r(p) . V r(X, Y) is not positive. Without the low-pass filter, this is the
+ * squared distance of the centre from the ray in standard deviations: the minimum along the ray. If
+ * s3 is 0, the Gaussian is a flat ellipse. Then q belongs to the point where the ray meets its
+ * plane. If a flat one is seen edge-on, the factor is 1.
+ *
+ * A footprint that reaches TRIP_GAUSSIAN_REACH_MAX is left out.
  *
  * Compositing
  * -----------
@@ -43,8 +49,10 @@
 #include "settings.h"
 
 #define TRIP_GAUSSIAN_CLAMP 1.3
-#define TRIP_GAUSSIAN_LOW_PASS 0.3 /* px^2 */
-#define TRIP_GAUSSIAN_NEAR 0.2     /* scene units */
+#define TRIP_GAUSSIAN_LOW_PASS 0.3   /* px^2 */
+#define TRIP_GAUSSIAN_NEAR 0.2       /* scene units */
+#define TRIP_GAUSSIAN_REACH_MAX 1e15 /* px */
+#define TRIP_GAUSSIAN_COLOUR_MAX 1e30
 #define TRIP_GAUSSIAN_ALPHA_MAX 0.99
 #define TRIP_GAUSSIAN_ALPHA_MIN (1.0 / 255)
 #define TRIP_GAUSSIAN_TERMINATION 1e-4

@@ -29,17 +29,25 @@ typedef struct trip_projected {
     float limit;                      /* a little above the q at which alpha is 1/255 */
     float opacity, rgb[3], z;
     float reach_x, reach_y;
-    float spare;
+    uint32_t curved; /* 1 or 0 */
 } trip_projected;
 
 _Static_assert(sizeof(trip_projected) == 64, "a projected Gaussian fills a cache line");
 
+/* The rest of a curved footprint. Bounds count from its centre. */
+typedef struct trip_curve {
+    float bend_x, bend_y, tilt, skew, turn;
+    float left, right, top, bottom;
+} trip_curve;
+
 typedef struct trip_tile_kernels {
     const char *isa;
     /* Draws splats[list[0]] to splats[list[count - 1]] into the tile with its corner at pixel (x,
-     * y). `open` has a bit for each block with an open pixel. The `depth` plane may be missing. */
-    void (*draw)(float *planes, uint16_t *open, const trip_projected *splats, const uint32_t *list,
-                 size_t count, int x, int y, float termination, bool depth);
+     * y). `curves` has an element for each splat, or is NULL if none is curved. `open` has a bit
+     * for each block with an open pixel. Without `depth`, its plane may be missing. */
+    void (*draw)(float *planes, uint16_t *open, const trip_projected *splats,
+                 const trip_curve *curves, const uint32_t *list, size_t count, int x, int y,
+                 float termination, bool depth);
 } trip_tile_kernels;
 
 /* Returns the kernels for the instruction set that the CPU renderer uses (cpu/kernels/isa.h), or

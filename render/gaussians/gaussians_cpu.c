@@ -45,10 +45,11 @@ struct trip_gaussians_cpu {
     uint16_t *open; /* for each tile, see trip_tile_kernels.draw */
 
     /* A batch, and the pieces of it that fit the lists. */
-    size_t batch_max, pairs_max;
+    size_t batch_max, curves_max, pairs_max;
     const trip_gaussian *gaussians;
     size_t batch;
     trip_projected *splats;
+    trip_curve *curves; /* NULL unless footprints are exact */
     tile_span *spans;
     size_t piece_from, piece_to;
     size_t *row_first, *row_pairs; /* entries and pairs before each row, and after the last */
@@ -61,35 +62,45 @@ struct trip_gaussians_cpu {
 
 /* ---- memory ---- */
 
-/* A field and its size in bytes, for taking and releasing all. */
-#define BUFFERS(g, X)                                                                              \
-    X((g)->planes, (g)->tiles *(g)->tile_floats * sizeof(float))                                   \
-    X((g)->open, (g)->tiles * sizeof(uint16_t))                                                    \
-    X((g)->row_first, ((size_t)(g)->rows + 1) * sizeof(size_t))                                    \
-    X((g)->row_pairs, ((size_t)(g)->rows + 1) * sizeof(size_t))                                    \
-    X((g)->tile_first, (g)->tiles * sizeof(uint32_t))                                              \
-    X((g)->tile_count, (g)->tiles * sizeof(uint32_t))                                              \
-    X((g)->splats, (g)->batch_max * sizeof(trip_projected))                                        \
-    X((g)->spans, (g)->batch_max * sizeof(tile_span))                                              \
-    X((g)->entries, (g)->pairs_max * sizeof(row_entry))                                            \
-    X((g)->pairs, (g)->pairs_max * sizeof(uint32_t))
+/* The fields of `g` that are buffers, and their sizes in bytes. */
+#define BUFFERS(X)                                                                                 \
+    X(g->planes, g->tiles * g->tile_floats * sizeof(float))                                        \
+    X(g->open, g->tiles * sizeof(uint16_t))                                                        \
+    X(g->row_first, ((size_t)g->rows + 1) * sizeof(size_t))                                        \
+    X(g->row_pairs, ((size_t)g->rows + 1) * sizeof(size_t))                                        \
+    X(g->tile_first, g->tiles * sizeof(uint32_t))                                                  \
+    X(g->tile_count, g->tiles * sizeof(uint32_t))                                                  \
+    X(g->splats, g->batch_max * sizeof(trip_projected))                                            \
+    X(g->curves, g->curves_max * sizeof(trip_curve))                                               \
+    X(g->spans, g->batch_max * sizeof(tile_span))                                                  \
+    X(g->entries, g->pairs_max * sizeof(row_entry))                                                \
+    X(g->pairs, g->pairs_max * sizeof(uint32_t))
 
 static void release_buffers(trip_gaussians_cpu *g)
 {
 #define RELEASE(field, bytes) trip_budget_release(g->budget, field, bytes), field = NULL;
-    BUFFERS(g, RELEASE)
+    BUFFERS(RELEASE)
 #undef RELEASE
+}
+
+/* Returns NULL for 0 bytes. Clears *all if the budget refuses. */
+static void *take(trip_gaussians_cpu *g, size_t bytes, bool *all)
+{
+    void *memory = bytes ? trip_budget_take(g->budget, bytes) : NULL;
+    *all &= memory || !bytes;
+    return memory;
 }
 
 static bool take_buffers(trip_gaussians_cpu *g, size_t batch_max)
 {
     bool all = true;
     g->batch_max = batch_max;
+    g->curves_max = g->settings.shape == TRIP_GAUSSIAN_EXACT ? batch_max : 0;
     g->pairs_max = batch_max * PAIRS_PER_GAUSSIAN; /* one Gaussian can meet all tiles */
     if (g->pairs_max < g->tiles)
         g->pairs_max = g->tiles;
-#define TAKE(field, bytes) all &= (field = trip_budget_take(g->budget, bytes)) != NULL;
-    BUFFERS(g, TAKE)
+#define TAKE(field, bytes) field = take(g, bytes, &all);
+    BUFFERS(TAKE)
 #undef TAKE
     if (!all)
         release_buffers(g);
@@ -184,9 +195,8 @@ static bool span_is_open(const trip_gaussians_cpu *g, const tile_span *span)
 static bool find_span(const trip_gaussians_cpu *g, const trip_gaussian_footprint *f,
                       tile_span *span)
 {
-    const trip_pixels x = trip_pixels_within(f->x - f->reach_x, f->x + f->reach_x, g->camera.width);
-    const trip_pixels y =
-        trip_pixels_within(f->y - f->reach_y, f->y + f->reach_y, g->camera.height);
+    const trip_pixels x = trip_pixels_within(f->lo[0], f->hi[0], g->camera.width);
+    const trip_pixels y = trip_pixels_within(f->lo[1], f->hi[1], g->camera.height);
     if (x.first > x.last || y.first > y.last)
         return false;
     *span = (tile_span){ (uint16_t)(x.first / TRIP_TILE_PX), (uint16_t)(x.last / TRIP_TILE_PX),
@@ -218,7 +228,13 @@ static void project(trip_gaussians_cpu *g, size_t i)
         .z = (float)f.z,
         .reach_x = (float)f.reach_x,
         .reach_y = (float)f.reach_y,
+        .curved = f.curved,
     };
+    if (f.curved)
+        g->curves[i] =
+            (trip_curve){ (float)f.bend_x,        (float)f.bend_y,        (float)f.tilt,
+                          (float)f.skew,          (float)f.turn,          (float)(f.lo[0] - f.x),
+                          (float)(f.hi[0] - f.x), (float)(f.lo[1] - f.y), (float)(f.hi[1] - f.y) };
 }
 
 static void project_some(void *context, unsigned task)
@@ -318,7 +334,7 @@ static void list_tiles(void *context, unsigned row)
     uint32_t *first = g->tile_first + tile, *count = g->tile_count + tile;
     memset(count, 0, (size_t)g->columns * sizeof *count);
     for (row_entry *e = from; e < to; e++) {
-        if (e->left < e->right)
+        if (e->left < e->right && !g->splats[e->splat].curved)
             narrow(g, (int)row, e);
         for (int column = e->left; column <= e->right; column++)
             count[column]++;
@@ -345,7 +361,7 @@ static void composite_some(void *context, unsigned task)
     for (size_t tile = from; tile < from + g->tile_task && tile < g->tiles; tile++)
         if (g->tile_count[tile] && g->open[tile])
             g->kernels->draw(g->planes + tile * g->tile_floats, &g->open[tile], g->splats,
-                             g->pairs + g->tile_first[tile], g->tile_count[tile],
+                             g->curves, g->pairs + g->tile_first[tile], g->tile_count[tile],
                              (int)(tile % (size_t)g->columns) * TRIP_TILE_PX,
                              (int)(tile / (size_t)g->columns) * TRIP_TILE_PX, termination,
                              g->settings.depth);

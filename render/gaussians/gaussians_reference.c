@@ -67,8 +67,8 @@ static void draw(trip_gaussians_reference *r, const trip_gaussian *g)
         return;
     double rgb[3];
     trip_gaussian_colour(g, r->settings.degree, trip_gaussian_direction(c, g), rgb);
-    const trip_pixels columns = trip_pixels_within(f.x - f.reach_x, f.x + f.reach_x, c->width);
-    const trip_pixels rows = trip_pixels_within(f.y - f.reach_y, f.y + f.reach_y, c->height);
+    const trip_pixels columns = trip_pixels_within(f.lo[0], f.hi[0], c->width);
+    const trip_pixels rows = trip_pixels_within(f.lo[1], f.hi[1], c->height);
     for (int y = rows.first; y <= rows.last; y++)
         for (int x = columns.first; x <= columns.last; x++) {
             pixel *p = &r->pixels[(size_t)y * (size_t)c->width + (size_t)x];

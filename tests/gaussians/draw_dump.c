@@ -3,10 +3,10 @@
  *     draw_dump IN OUT RENDERER [THREADS [BATCH [ISA [REPEATS]]]]
  *
  * IN holds little-endian doubles: width, height, ortho height, fov, eye, look, up, degree,
- * antialiased, opacity scale, depth, then 59 numbers for each Gaussian in the order of drawing:
- * centre, deviations, rotation, opacity, 16 coefficients of 3 channels. OUT gets 4 floats for each
- * pixel, then the distances with depth. RENDERER is cpu or reference. With REPEATS it prints the
- * times of the fastest picture. */
+ * antialiased, opacity scale, depth, exact, then 59 numbers for each Gaussian in the order of
+ * drawing: centre, deviations, rotation, opacity, 16 coefficients of 3 channels. OUT gets 4 floats
+ * for each pixel, then the distances with depth. RENDERER is cpu or reference. With REPEATS it
+ * prints the times of the fastest picture. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -16,7 +16,7 @@
 #include "gaussians_cpu.h"
 #include "gaussians_reference.h"
 
-enum { HEADER = 17, NUMBERS = 59 };
+enum { HEADER = 18, NUMBERS = 59 };
 
 typedef struct run {
     trip_camera camera;

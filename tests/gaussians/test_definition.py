@@ -31,14 +31,14 @@ def around(scene, size, count, distance):
                "size": size}
 
 
-def write_dump(path, scene, view, antialiased, depth=False):
+def write_dump(path, scene, view, antialiased):
     nearest_first = definition.order(scene, view)
     count = len(nearest_first)
     coefficients = numpy.zeros((count, 16, 3))
     coefficients[:, :scene["sh"].shape[1]] = scene["sh"][nearest_first]
     degree = math.isqrt(scene["sh"].shape[1]) - 1
     header = [*view["size"], view.get("ortho_height", 0), view["fov"], *view["eye"], *view["look"],
-              *view["up"], degree, antialiased, 1, depth]
+              *view["up"], degree, antialiased, 1, 0, 0]
     numbers = numpy.column_stack([scene[key][nearest_first] for key in
                                   ("centre", "deviations", "rotation", "opacity")]
                                  + [coefficients.reshape(count, 48)])

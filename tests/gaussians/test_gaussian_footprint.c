@@ -34,7 +34,7 @@ static const trip_gaussian_settings plain;
 static trip_gaussian_footprint drawn(const trip_camera *c, const trip_gaussian_settings *s,
                                      const trip_gaussian *g)
 {
-    trip_gaussian_footprint f;
+    trip_gaussian_footprint f = { 0 };
     assert_true(trip_gaussian_footprint_of(c, s, g, &f));
     return f;
 }
@@ -173,6 +173,111 @@ static void faint_near_and_clipped_gaussians_are_not_drawn(void **state)
     assert_false(is_drawn(&c, &s, &g));
 }
 
+static void turn_about_y(trip_gaussian *g, double degrees)
+{
+    g->rotation[0] = (float)cos(degrees * PI / 360);
+    g->rotation[2] = (float)sin(degrees * PI / 360);
+}
+
+static const trip_gaussian_settings exact = { .shape = TRIP_GAUSSIAN_EXACT };
+
+/* A ray meets the plane of a flat Gaussian at a point, which lies some deviations from the centre.
+ * The footprint is so large that the low-pass filter changes little. */
+static void an_exact_flat_gaussian_is_where_rays_meet_its_plane(void **state)
+{
+    (void)state;
+    const trip_camera c = camera_of(20000, 0); /* 100 px of focal length */
+    trip_gaussian g = round_at(2, 1, 10, 0);
+    g.deviations[0] = 4;
+    g.deviations[1] = 3;
+    g.opacity = 1;
+    turn_about_y(&g, 40);
+    const trip_gaussian_footprint f = drawn(&c, &exact, &g);
+    const double cosine = cos(40 * PI / 180), sine = sin(40 * PI / 180);
+    /* Picture x is -x of the scene and picture y is -y. Axis 0 is (cos, 0, -sin), the normal (sin,
+     * 0, cos). */
+    int met = 0;
+    for (double dx = -150; dx <= 150; dx += 25)
+        for (double dy = -100; dy <= 100; dy += 25) {
+            const double x = -(f.x + dx - 10000) / 100, y = -(f.y + dy - 100) / 100;
+            const double t = (2 * sine + 10 * cosine) / (x * sine + cosine);
+            const double u = (t * x - 2) * cosine - (t - 10) * sine, v = t * y - 1;
+            if (t <= 0)
+                continue;
+            met++;
+            assert_close(trip_gaussian_radius2(&f, dx, dy), u * u / 16 + v * v / 9, 3e-3);
+        }
+    assert_true(met > 60);
+}
+
+/* Along a ray, the squared distance in deviations has its minimum q. The minimum is found by small
+ * steps. */
+static void an_exact_gaussian_is_the_minimum_along_the_ray(void **state)
+{
+    (void)state;
+    const trip_camera c = camera_of(20000, 0);
+    trip_gaussian g = round_at(3, -1, 10, 0);
+    g.deviations[0] = 1;
+    g.deviations[1] = 2;
+    g.deviations[2] = 3;
+    g.opacity = 1;
+    turn_about_y(&g, 25);
+    const trip_gaussian_footprint f = drawn(&c, &exact, &g);
+    for (double dx = -60; dx <= 60; dx += 20)
+        for (double dy = -60; dy <= 60; dy += 20) {
+            const double x = -(f.x + dx - 10000) / 100, y = -(f.y + dy - 100) / 100;
+            double min = INFINITY;
+            for (double t = 0; t < 40; t += 0.002) {
+                const trip_vec3 to =
+                    trip_gaussian_to_axes(&g, trip_v3(t * x - 3, t * y + 1, t - 10));
+                min = fmin(min, to.x * to.x + to.y * to.y / 4 + to.z * to.z / 9);
+            }
+            assert_close(trip_gaussian_radius2(&f, dx, dy), min, 3e-3);
+            assert_true(min > f.limit || (f.x + dx >= f.lo[0] && f.x + dx <= f.hi[0] &&
+                                          f.y + dy >= f.lo[1] && f.y + dy <= f.hi[1]));
+        }
+}
+
+/* At the bounds, the least q of a line is the limit. */
+static void bounds_of_an_exact_gaussian_are_tight(void **state)
+{
+    (void)state;
+    const trip_camera c = camera_of(400, 0);
+    trip_gaussian g = round_at(4, 2, 8, 0);
+    g.deviations[0] = 0.5f;
+    g.deviations[1] = 1;
+    g.deviations[2] = 1.5f;
+    turn_about_y(&g, -30);
+    const trip_gaussian_footprint f = drawn(&c, &exact, &g);
+    double left = INFINITY, bottom = INFINITY;
+    for (double t = f.lo[0]; t <= f.hi[0]; t += 0.01)
+        bottom = fmin(bottom, trip_gaussian_radius2(&f, t - f.x, f.hi[1] - f.y));
+    for (double t = f.lo[1]; t <= f.hi[1]; t += 0.01)
+        left = fmin(left, trip_gaussian_radius2(&f, f.lo[0] - f.x, t - f.y));
+    assert_close(left, f.limit, 1e-4);
+    assert_close(bottom, f.limit, 1e-4);
+}
+
+static void unusable_numbers_draw_nothing(void **state)
+{
+    (void)state;
+    const trip_camera c = camera_of(200, 0);
+    const float bad[] = { NAN, INFINITY, 1e30f };
+    for (int i = 0; i < 3; i++) {
+        trip_gaussian g = round_at(0, 0, 10, 1);
+        g.deviations[1] = bad[i];
+        assert_false(is_drawn(&c, &plain, &g));
+        g = round_at((double)bad[i], 0, 10, 1);
+        assert_false(is_drawn(&c, &plain, &g));
+        g = round_at(0, 0, 10, 1);
+        g.opacity = i == 2 ? -1 : bad[i];
+        assert_false(is_drawn(&c, &plain, &g));
+        g = round_at(0, 0, 10, 1);
+        g.rotation[2] = bad[i];
+        assert_false(is_drawn(&c, &plain, &g));
+    }
+}
+
 /* The integral over the sphere of the product of two harmonics is 1 if they are equal, else 0. */
 static void harmonics_are_orthonormal(void **state)
 {
@@ -248,6 +353,10 @@ int main(void)
         cmocka_unit_test(antialiased_scenes_keep_the_mass_of_small_gaussians),
         cmocka_unit_test(an_opacity_scale_multiplies_the_optical_depth_at_the_centre),
         cmocka_unit_test(faint_near_and_clipped_gaussians_are_not_drawn),
+        cmocka_unit_test(an_exact_flat_gaussian_is_where_rays_meet_its_plane),
+        cmocka_unit_test(an_exact_gaussian_is_the_minimum_along_the_ray),
+        cmocka_unit_test(bounds_of_an_exact_gaussian_are_tight),
+        cmocka_unit_test(unusable_numbers_draw_nothing),
         cmocka_unit_test(harmonics_are_orthonormal),
         cmocka_unit_test(harmonics_have_the_trainers_signs),
         cmocka_unit_test(a_colour_is_a_half_plus_harmonics_and_not_negative),

@@ -258,14 +258,21 @@ static const trip_gaussian_settings full = {
     .degree = 3, .antialiased = true, .background = { 0.2, 0.4, 0.6, 0.9 }, .depth = true
 };
 
+static const trip_gaussian_settings exact = {
+    .degree = 3, .shape = TRIP_GAUSSIAN_EXACT, .background = { 0.2, 0.4, 0.6, 0.9 }, .depth = true
+};
+
 static void expect_same(way w)
 {
     const trip_camera c = camera_of(0);
-    draw(&one, &c, &full, random_scene(), SCENE, (way){ 0 });
-    draw(&other, &c, &full, random_scene(), SCENE, w);
-    assert_memory_equal(one.rgba, other.rgba, sizeof one.rgba);
-    assert_memory_equal(one.depth, other.depth, sizeof one.depth);
-    assert_int_equal(one.open_tiles, other.open_tiles);
+    for (int i = 0; i < 2; i++) {
+        const trip_gaussian_settings *s = i ? &exact : &full;
+        draw(&one, &c, s, random_scene(), SCENE, (way){ 0 });
+        draw(&other, &c, s, random_scene(), SCENE, w);
+        assert_memory_equal(one.rgba, other.rgba, sizeof one.rgba);
+        assert_memory_equal(one.depth, other.depth, sizeof one.depth);
+        assert_int_equal(one.open_tiles, other.open_tiles);
+    }
 }
 
 static void threads_change_no_bit(void **state)
@@ -362,6 +369,33 @@ static void parallel_views_agree_with_the_reference(void **state)
     expect_the_reference(&c, &s);
 }
 
+static void exact_footprints_agree_with_the_reference(void **state)
+{
+    (void)state;
+    const trip_camera c = camera_of(0), parallel = camera_of(12);
+    expect_the_reference(&c, &exact);
+    expect_the_reference(&parallel, &exact);
+}
+
+/* One unusable number must not reach other pixels of a vector. */
+static void unusable_colours_stay_in_their_pixels(void **state)
+{
+    (void)state;
+    const trip_camera c = camera_of(9);
+    trip_gaussian g = round_at(-0.05, -0.05, 5, 0.2, 0.5);
+    for (int i = 0; i < TRIP_SH_MAX; i++)
+        for (int channel = 0; channel < 3; channel++)
+            g.sh[i][channel] = channel == 0 ? INFINITY : channel == 1 ? -INFINITY : NAN;
+    draw(&one, &c, &(trip_gaussian_settings){ .degree = 0 }, &g, 1, (way){ 0 });
+    for (int y = 0; y < HEIGHT; y++)
+        for (int x = 0; x < WIDTH; x++)
+            for (int k = 0; k < 4; k++) {
+                assert_true(isfinite(pixel(&one, x, y)[k]));
+                if (hypot(x - 75, y - 45) > 8)
+                    assert_close((double)pixel(&one, x, y)[k], 0, 0);
+            }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -377,6 +411,8 @@ int main(void)
         cmocka_unit_test(too_little_memory_is_refused_in_a_line),
         cmocka_unit_test(perspective_agrees_with_the_reference),
         cmocka_unit_test(parallel_views_agree_with_the_reference),
+        cmocka_unit_test(exact_footprints_agree_with_the_reference),
+        cmocka_unit_test(unusable_colours_stay_in_their_pixels),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
