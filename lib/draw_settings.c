@@ -486,7 +486,8 @@ static const trip_option rows[DRAW_OPTIONS] = {
                        "pixel", "pre only", .group = DRAW_GROUP_PAPERS, .measured = true,
                        AT(splat.weights), CHOICE(weights) },
     [DRAW_ORDER] = { "order", "depth|lists",
-                     "Selects the order of the Gaussians of a scene: by the depth of their centres, "
+                     "Selects the order of the Gaussians of a scene: by the depth of their "
+                     "centres, "
                      "or by the three lists, which sorts nothing",
                      "depth", "Gaussian scenes only", .group = DRAW_GROUP_ACCURACY,
                      .measured = true, AT(scene.order), CHOICE(orders) },

@@ -316,7 +316,7 @@ int draw_settings_check_kind(const draw_settings *s, bool is_scene)
     static const uint64_t of_scenes = ROW(ORDER) | ROW(HARMONICS);
     static const uint64_t of_both = ROW(BACKGROUND) | ROW(CLIP_BOX) | ROW(CLIP_PLANE) |
                                     ROW(EARLY_TERMINATION) | ROW(FOOTPRINT) | ROW(SAMPLES) |
-                                    ROW(DEPTH) | ROW(NORMALISE);
+                                    ROW(DEPTH) | ROW(NORMALISE) | ROW(METHOD) | ROW(H);
     const struct rule of_kind = {
         .given = is_scene ? ~(of_scenes | of_both) : of_scenes,
         .why = is_scene ? "does not apply to Gaussian scenes" : "applies to Gaussian scenes only",

@@ -20,7 +20,7 @@ int triptych_get_histogram(triptych *t, triptych_histogram *out)
     trip_scope *before = trip_context_enter(t);
     trip_histogram histogram;
     *out = (triptych_histogram){ 0 };
-    int status = trip_context_check_open(t);
+    int status = trip_context_check_volume(t);
     if (!status)
         status = session_read_text(&t->session);
     if (!status && trip_dataset_metadata_histogram(t->session.text, &histogram)) {

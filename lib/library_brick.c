@@ -494,6 +494,8 @@ static int use_source(triptych *t, const char *path, const triptych_brick_option
 {
     const char *fault = fault_of_volume(o);
     int status = trip_context_check_idle(t, true);
+    if (!status)
+        status = trip_context_check_volume(t);
     if (!status && fault)
         status = trip_fail(TRIP_USAGE, "read", path, "%s", fault);
     if (!status && t->resources.renderer != TRIPTYCH_RENDERER_INTEGRAL)

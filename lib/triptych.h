@@ -207,6 +207,27 @@ typedef struct triptych_info {
  */
 TRIPTYCH_API int triptych_get_info(triptych *t, triptych_info *out);
 
+/* An open data set of a Gaussian scene. Lengths are in units of the scene. */
+typedef struct triptych_scene {
+    uint64_t gaussians, bricks; /* bricks of the three lists */
+    uint64_t bytes;             /* of all files */
+    int degree;                 /* of the spherical harmonics, 0 to 3 */
+    int antialiased;            /* trained with opacities that make up for the blur of pixels */
+    int flat;                   /* surfels: each has no thickness along one axis */
+    int y_down;                 /* the scene's y axis points down */
+    double lo[3], hi[3];        /* bounds of all centres */
+    /* Bounds of the centres without the outer 1 % on each side. Views fit these. */
+    double typical_lo[3], typical_hi[3];
+    const char *notes; /* JSON; belongs to the data set */
+} triptych_scene;
+
+/* Returns 1 if the open data set is a Gaussian scene. These functions do not apply to scenes, and
+ * fail with TRIPTYCH_USAGE: triptych_get_info(), triptych_get_list(), triptych_add(), and those
+ * about values, heat and probes. */
+TRIPTYCH_API int triptych_is_scene(const triptych *t);
+/* Describes the open scene. Fails with TRIPTYCH_USAGE if a volume or nothing is open. */
+TRIPTYCH_API int triptych_get_scene(triptych *t, triptych_scene *out);
+
 /* A list: records of one kind along one axis at one level of detail. */
 typedef struct triptych_list {
     const char *path; /* of the data set that has the list; valid until it is closed */
