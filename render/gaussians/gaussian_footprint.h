@@ -195,6 +195,55 @@ static inline double trip_gaussian_radius2(const trip_gaussian_footprint *f, dou
     return w > 0 ? (u * u + v * v) / (w * w + a * a + b * b) : INFINITY;
 }
 
+/* Returns the maximum length of the rows of J times z over all pixel positions that the Jacobian is
+ * limited to. Without perspective it is that of the rows of J. */
+static inline double trip_gaussian_stretch(const trip_camera *c, trip_vec3 to, int size)
+{
+    if (c->ortho)
+        return trip_length(to);
+    const double half = 0.5 * size, reach = half * TRIP_GAUSSIAN_CLAMP;
+    return fmax(trip_length(trip_sub(to, trip_scale(c->forward, half - reach))),
+                trip_length(trip_sub(to, trip_scale(c->forward, half + reach))));
+}
+
+/* Computes pixel bounds of all projected footprints that have a centre in the box and deviations up
+ * to `deviation`. The bounds are infinite if the box crosses the near plane. Returns false if it is
+ * behind that plane. */
+static inline bool trip_gaussian_box_bounds(const trip_camera *c, const double box_lo[3],
+                                            const double box_hi[3], double deviation, double lo[2],
+                                            double hi[2])
+{
+    const double near = c->ortho ? 0 : TRIP_GAUSSIAN_NEAR * trip_length(c->forward);
+    double nearest = INFINITY, farthest = -INFINITY;
+    lo[0] = lo[1] = INFINITY;
+    hi[0] = hi[1] = -INFINITY;
+    for (int i = 0; i < 8; i++) {
+        const trip_vec3 corner =
+            trip_v3(i & 1 ? box_hi[0] : box_lo[0], i & 2 ? box_hi[1] : box_lo[1],
+                    i & 4 ? box_hi[2] : box_lo[2]);
+        const trip_vec3 from_eye = trip_sub(corner, c->eye);
+        const double z = trip_dot(c->forward, from_eye), by = c->ortho ? 1 : z;
+        const double at[2] = { trip_dot(c->to_x, from_eye) / by, trip_dot(c->to_y, from_eye) / by };
+        nearest = fmin(nearest, z);
+        farthest = fmax(farthest, z);
+        for (int k = 0; k < 2; k++) {
+            lo[k] = fmin(lo[k], at[k]);
+            hi[k] = fmax(hi[k], at[k]);
+        }
+    }
+    const double limit = -2 * log(TRIP_GAUSSIAN_ALPHA_MIN), by = c->ortho ? 1 : nearest;
+    for (int k = 0; k < 2; k++) {
+        const double stretch =
+            trip_gaussian_stretch(c, k ? c->to_y : c->to_x, k ? c->height : c->width);
+        const double wide = deviation * stretch / by;
+        const double reach =
+            nearest > near ? sqrt(limit * (wide * wide + TRIP_GAUSSIAN_LOW_PASS)) : INFINITY;
+        lo[k] -= reach + 1e-6; /* for rounding */
+        hi[k] += reach + 1e-6;
+    }
+    return farthest > near;
+}
+
 /* Returns the direction of unit length in scene space that the colour belongs to. */
 static inline trip_vec3 trip_gaussian_direction(const trip_camera *c, const trip_gaussian *g)
 {

@@ -419,6 +419,18 @@ bool trip_gaussians_cpu_is_open(const trip_gaussians_cpu *g, const double lo[2],
                          (uint16_t)(y.first / TRIP_TILE_PX), (uint16_t)(y.last / TRIP_TILE_PX) });
 }
 
+bool trip_gaussians_cpu_needs_box(const trip_gaussians_cpu *g, const double lo[3],
+                                  const double hi[3], double deviation)
+{
+    double from[2], to[2];
+    if (!trip_gaussian_box_bounds(&g->camera, lo, hi, deviation, from, to))
+        return false;
+    /* Exact footprints have no bounds in common. */
+    if (g->settings.shape == TRIP_GAUSSIAN_EXACT && !g->camera.ortho)
+        return trip_gaussians_cpu_open_tiles(g) > 0;
+    return trip_gaussians_cpu_is_open(g, from, to);
+}
+
 size_t trip_gaussians_cpu_open_tiles(const trip_gaussians_cpu *g)
 {
     size_t open = 0;

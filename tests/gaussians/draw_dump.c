@@ -92,9 +92,12 @@ static void read_scene(run *r, const char *path)
     const trip_affine identity = trip_affine_identity();
     if (trip_camera_make(&r->camera, &params, &identity))
         exit(1);
-    r->settings = (trip_gaussian_settings){
-        .degree = (int)h[13], .antialiased = h[14] != 0, .opacity_scale = h[15], .depth = h[16] != 0
-    };
+    r->settings = (trip_gaussian_settings){ .degree = (int)h[13],
+                                            .antialiased = h[14] != 0,
+                                            .opacity_scale = h[15],
+                                            .depth = h[16] != 0,
+                                            .shape = h[17] != 0 ? TRIP_GAUSSIAN_EXACT
+                                                                : TRIP_GAUSSIAN_PROJECTED };
     double n[NUMBERS];
     for (size_t room = 0; fread(n, sizeof *n, NUMBERS, in) == NUMBERS; r->count++) {
         if (r->count == room) {
