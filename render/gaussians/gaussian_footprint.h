@@ -5,9 +5,11 @@
 #include "gaussian_colour.h"
 #include "gaussian_picture.h"
 
-/* A footprint in the picture. With d = p - (x, y), the squared radius is
- *     q(p) = N / D,   N = (across (d.x - shear d.y))^2 + (down d.y)^2
+/* A footprint in the picture. With d = p - (x, y), the squared radius is q(p) = N / D:
+ *
+ *     N = (across (d.x - shear d.y))^2 + (down d.y)^2
  *     D = w^2 + (tilt d.x + skew d.y)^2 + (turn d.y)^2,   w = 1 + bend_x d.x + bend_y d.y
+ *
  * It is infinite where w <= 0. D is 1 unless the footprint is curved. */
 typedef struct trip_gaussian_footprint {
     double x, y, z; /* pixel position of the centre, and its depth (camera.h) */
@@ -196,7 +198,7 @@ static inline double trip_gaussian_radius2(const trip_gaussian_footprint *f, dou
 }
 
 /* Returns the maximum length of the rows of J times z over all pixel positions that the Jacobian is
- * limited to. Without perspective it is that of the rows of J. */
+ * limited to. Without perspective, z is 1. */
 static inline double trip_gaussian_stretch(const trip_camera *c, trip_vec3 to, int size)
 {
     if (c->ortho)

@@ -293,7 +293,7 @@ static void list_rows(trip_gaussians_cpu *g)
 }
 
 /* Returns the distance from the centre to the ellipse's rightmost point where dy is in [from, to].
- * `across` and `shear` are those of the footprint, or negative for the leftmost point. */
+ * Give the negative `shear` for the distance to the leftmost point. */
 static float farthest(const trip_projected *s, float shear, float from, float to)
 {
     /* The rightmost point of the whole ellipse. Its reach_x^2 is limit (1 / across^2 + (shear /

@@ -44,9 +44,8 @@ int trip_gaussians_cpu_add(trip_gaussians_cpu *g, const trip_gaussian *gaussians
  * meets closed tiles changes nothing. */
 bool trip_gaussians_cpu_is_open(const trip_gaussians_cpu *g, const double lo[2],
                                 const double hi[2]);
-/* Returns false if no Gaussian can change the picture that has its centre in the box, in scene
- * space, and deviations up to `deviation`: the Gaussians of a brick need not be read. The clip is
- * left to the caller. */
+/* Returns whether a brick of Gaussians may change the picture. All its centres lie in the box, in
+ * scene space, and its deviations are at most `deviation`. The caller checks the clip. */
 bool trip_gaussians_cpu_needs_box(const trip_gaussians_cpu *g, const double lo[3],
                                   const double hi[3], double deviation);
 /* Returns the number of open tiles. */
