@@ -140,12 +140,12 @@ static inline double trip_gaussian_opacity(const trip_gaussian *g, const trip_ga
 static inline bool trip_gaussian_project(const trip_camera *c, const trip_gaussian_settings *s,
                                          const trip_gaussian *g, trip_gaussian_footprint *f)
 {
-    const bool exact = s->shape == TRIP_GAUSSIAN_EXACT;
+    const bool limited = s->shape == TRIP_GAUSSIAN_PROJECTED;
     trip_vec3 jx = c->to_x, jy = c->to_y;
     if (!c->ortho) {
         const double w = 0.5 * c->width, h = 0.5 * c->height, clamp = TRIP_GAUSSIAN_CLAMP;
-        const double x = exact ? f->x : fmin(w * (1 + clamp), fmax(w * (1 - clamp), f->x));
-        const double y = exact ? f->y : fmin(h * (1 + clamp), fmax(h * (1 - clamp), f->y));
+        const double x = !limited ? f->x : fmin(w * (1 + clamp), fmax(w * (1 - clamp), f->x));
+        const double y = !limited ? f->y : fmin(h * (1 + clamp), fmax(h * (1 - clamp), f->y));
         jx = trip_scale(trip_sub(jx, trip_scale(c->forward, x)), 1 / f->z);
         jy = trip_scale(trip_sub(jy, trip_scale(c->forward, y)), 1 / f->z);
     }
@@ -157,7 +157,9 @@ static inline bool trip_gaussian_project(const trip_camera *c, const trip_gaussi
     const double bare = trip_dot(trip_cross(a, b), trip_cross(a, b)), add = TRIP_GAUSSIAN_LOW_PASS;
     const double filtered = bare + add * (xx + yy) + add * add;
     double opacity = trip_gaussian_opacity(g, s);
-    if (s->antialiased)
+    if (s->shape == TRIP_GAUSSIAN_EWA)
+        opacity *= sqrt(bare / filtered);
+    else if (s->antialiased)
         opacity *= sqrt(fmax(TRIP_GAUSSIAN_COMPENSATION_MIN, bare / filtered));
     if (!trip_gaussian_set_opacity(f, opacity))
         return false;
@@ -165,7 +167,7 @@ static inline bool trip_gaussian_project(const trip_camera *c, const trip_gaussi
     const double max = TRIP_GAUSSIAN_REACH_MAX;
     if (!(f->reach_x < max && f->reach_y < max && fabs(f->x) < max && fabs(f->y) < max))
         return false;
-    if (exact)
+    if (s->shape == TRIP_GAUSSIAN_EXACT)
         trip_gaussian_curve(c, g, f);
     return true;
 }
@@ -208,9 +210,9 @@ static inline double trip_gaussian_stretch(const trip_camera *c, trip_vec3 to, i
                 trip_length(trip_sub(to, trip_scale(c->forward, half + reach))));
 }
 
-/* Computes pixel bounds of all projected footprints that have a centre in the box and deviations up
- * to `deviation`. The bounds are infinite if the box crosses the near plane. Returns false if it is
- * behind that plane. */
+/* Computes pixel bounds of all footprints with a limited Jacobian that have a centre in the box and
+ * deviations up to `deviation`. The bounds are infinite if the box crosses the near plane. Returns
+ * false if it is behind that plane. */
 static inline bool trip_gaussian_box_bounds(const trip_camera *c, const double box_lo[3],
                                             const double box_hi[3], double deviation, double lo[2],
                                             double hi[2])

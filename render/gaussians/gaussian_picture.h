@@ -34,6 +34,9 @@
  * s3 is 0, the Gaussian is a flat ellipse. Then q belongs to the point where the ray meets its
  * plane. If a flat one is seen edge-on, the factor is 1.
  *
+ * With the EWA footprint, J is not limited either, and m is sqrt(|J S J^T| / |S2|): the filter
+ * keeps the footprint's mass.
+ *
  * A footprint that reaches TRIP_GAUSSIAN_REACH_MAX is left out.
  *
  * Compositing
@@ -73,6 +76,7 @@
 typedef enum trip_gaussian_shape {
     TRIP_GAUSSIAN_PROJECTED, /* by the Jacobian at the centre, as scenes are trained */
     TRIP_GAUSSIAN_EXACT,     /* by the distance from each pixel's ray */
+    TRIP_GAUSSIAN_EWA,       /* by the Jacobian without limits (Zwicker et al. 2001) */
 } trip_gaussian_shape;
 
 typedef struct trip_gaussian_settings {

@@ -425,8 +425,8 @@ bool trip_gaussians_cpu_needs_box(const trip_gaussians_cpu *g, const double lo[3
     double from[2], to[2];
     if (!trip_gaussian_box_bounds(&g->camera, lo, hi, deviation, from, to))
         return false;
-    /* Exact footprints have no bounds in common. */
-    if (g->settings.shape == TRIP_GAUSSIAN_EXACT && !g->camera.ortho)
+    /* Footprints without limits have no bounds in common. */
+    if (g->settings.shape != TRIP_GAUSSIAN_PROJECTED && !g->camera.ortho)
         return trip_gaussians_cpu_open_tiles(g) > 0;
     return trip_gaussians_cpu_is_open(g, from, to);
 }

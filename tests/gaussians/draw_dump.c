@@ -4,7 +4,7 @@
  *
  * IN holds little-endian doubles.
  * - A view: width, height, ortho height, fov, eye, look, up.
- * - Settings: degree, antialiased, opacity scale, depth, exact.
+ * - Settings: degree, antialiased, opacity scale, depth, shape.
  * - Each Gaussian in the order of drawing: centre, deviations, rotation, opacity, 48 coefficients.
  *
  * OUT gets 4 floats for each pixel, then the distances with depth. RENDERER is cpu or reference.
@@ -98,8 +98,7 @@ static void read_scene(run *r, const char *path)
                                             .antialiased = h[14] != 0,
                                             .opacity_scale = h[15],
                                             .depth = h[16] != 0,
-                                            .shape = h[17] != 0 ? TRIP_GAUSSIAN_EXACT
-                                                                : TRIP_GAUSSIAN_PROJECTED };
+                                            .shape = (trip_gaussian_shape)h[17] };
     double n[NUMBERS];
     for (size_t room = 0; fread(n, sizeof *n, NUMBERS, in) == NUMBERS; r->count++) {
         if (r->count == room) {
