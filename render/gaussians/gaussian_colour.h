@@ -8,7 +8,7 @@
 #include "gaussian_picture.h"
 
 /* Computes the values of the first trip_sh_count(degree) harmonics for a direction of unit length.
- * The signs are those of Kerbl et al. 2023. */
+ * The signs follow Kerbl et al. 2023. */
 static inline void trip_sh_basis(int degree, trip_vec3 d, double basis[TRIP_SH_MAX])
 {
     const double x = d.x, y = d.y, z = d.z, xx = x * x, yy = y * y, zz = z * z;

@@ -5,9 +5,11 @@
 #include "gaussian_colour.h"
 #include "gaussian_picture.h"
 
-/* A footprint in the picture. With d = p - (x, y), the squared radius is
- *     q(p) = N / D,   N = (across (d.x - shear d.y))^2 + (down d.y)^2
+/* A footprint in the picture. With d = p - (x, y), the squared radius is q(p) = N / D:
+ *
+ *     N = (across (d.x - shear d.y))^2 + (down d.y)^2
  *     D = w^2 + (tilt d.x + skew d.y)^2 + (turn d.y)^2,   w = 1 + bend_x d.x + bend_y d.y
+ *
  * It is infinite where w <= 0. D is 1 unless the footprint is curved. */
 typedef struct trip_gaussian_footprint {
     double x, y, z; /* pixel position of the centre, and its depth (camera.h) */
@@ -138,12 +140,12 @@ static inline double trip_gaussian_opacity(const trip_gaussian *g, const trip_ga
 static inline bool trip_gaussian_project(const trip_camera *c, const trip_gaussian_settings *s,
                                          const trip_gaussian *g, trip_gaussian_footprint *f)
 {
-    const bool exact = s->shape == TRIP_GAUSSIAN_EXACT;
+    const bool limited = s->shape == TRIP_GAUSSIAN_PROJECTED;
     trip_vec3 jx = c->to_x, jy = c->to_y;
     if (!c->ortho) {
         const double w = 0.5 * c->width, h = 0.5 * c->height, clamp = TRIP_GAUSSIAN_CLAMP;
-        const double x = exact ? f->x : fmin(w * (1 + clamp), fmax(w * (1 - clamp), f->x));
-        const double y = exact ? f->y : fmin(h * (1 + clamp), fmax(h * (1 - clamp), f->y));
+        const double x = !limited ? f->x : fmin(w * (1 + clamp), fmax(w * (1 - clamp), f->x));
+        const double y = !limited ? f->y : fmin(h * (1 + clamp), fmax(h * (1 - clamp), f->y));
         jx = trip_scale(trip_sub(jx, trip_scale(c->forward, x)), 1 / f->z);
         jy = trip_scale(trip_sub(jy, trip_scale(c->forward, y)), 1 / f->z);
     }
@@ -155,7 +157,9 @@ static inline bool trip_gaussian_project(const trip_camera *c, const trip_gaussi
     const double bare = trip_dot(trip_cross(a, b), trip_cross(a, b)), add = TRIP_GAUSSIAN_LOW_PASS;
     const double filtered = bare + add * (xx + yy) + add * add;
     double opacity = trip_gaussian_opacity(g, s);
-    if (s->antialiased)
+    if (s->shape == TRIP_GAUSSIAN_EWA)
+        opacity *= sqrt(bare / filtered);
+    else if (s->antialiased)
         opacity *= sqrt(fmax(TRIP_GAUSSIAN_COMPENSATION_MIN, bare / filtered));
     if (!trip_gaussian_set_opacity(f, opacity))
         return false;
@@ -163,7 +167,7 @@ static inline bool trip_gaussian_project(const trip_camera *c, const trip_gaussi
     const double max = TRIP_GAUSSIAN_REACH_MAX;
     if (!(f->reach_x < max && f->reach_y < max && fabs(f->x) < max && fabs(f->y) < max))
         return false;
-    if (exact)
+    if (s->shape == TRIP_GAUSSIAN_EXACT)
         trip_gaussian_curve(c, g, f);
     return true;
 }
@@ -193,6 +197,55 @@ static inline double trip_gaussian_radius2(const trip_gaussian_footprint *f, dou
     const double w = 1 + f->bend_x * dx + f->bend_y * dy;
     const double a = f->tilt * dx + f->skew * dy, b = f->turn * dy;
     return w > 0 ? (u * u + v * v) / (w * w + a * a + b * b) : INFINITY;
+}
+
+/* Returns the maximum length of the rows of J times z over all pixel positions that the Jacobian is
+ * limited to. Without perspective, z is 1. */
+static inline double trip_gaussian_stretch(const trip_camera *c, trip_vec3 to, int size)
+{
+    if (c->ortho)
+        return trip_length(to);
+    const double half = 0.5 * size, reach = half * TRIP_GAUSSIAN_CLAMP;
+    return fmax(trip_length(trip_sub(to, trip_scale(c->forward, half - reach))),
+                trip_length(trip_sub(to, trip_scale(c->forward, half + reach))));
+}
+
+/* Computes pixel bounds of all footprints with a limited Jacobian that have a centre in the box and
+ * deviations up to `deviation`. The bounds are infinite if the box crosses the near plane. Returns
+ * false if it is behind that plane. */
+static inline bool trip_gaussian_box_bounds(const trip_camera *c, const double box_lo[3],
+                                            const double box_hi[3], double deviation, double lo[2],
+                                            double hi[2])
+{
+    const double near = c->ortho ? 0 : TRIP_GAUSSIAN_NEAR * trip_length(c->forward);
+    double nearest = INFINITY, farthest = -INFINITY;
+    lo[0] = lo[1] = INFINITY;
+    hi[0] = hi[1] = -INFINITY;
+    for (int i = 0; i < 8; i++) {
+        const trip_vec3 corner =
+            trip_v3(i & 1 ? box_hi[0] : box_lo[0], i & 2 ? box_hi[1] : box_lo[1],
+                    i & 4 ? box_hi[2] : box_lo[2]);
+        const trip_vec3 from_eye = trip_sub(corner, c->eye);
+        const double z = trip_dot(c->forward, from_eye), by = c->ortho ? 1 : z;
+        const double at[2] = { trip_dot(c->to_x, from_eye) / by, trip_dot(c->to_y, from_eye) / by };
+        nearest = fmin(nearest, z);
+        farthest = fmax(farthest, z);
+        for (int k = 0; k < 2; k++) {
+            lo[k] = fmin(lo[k], at[k]);
+            hi[k] = fmax(hi[k], at[k]);
+        }
+    }
+    const double limit = -2 * log(TRIP_GAUSSIAN_ALPHA_MIN), by = c->ortho ? 1 : nearest;
+    for (int k = 0; k < 2; k++) {
+        const double stretch =
+            trip_gaussian_stretch(c, k ? c->to_y : c->to_x, k ? c->height : c->width);
+        const double wide = deviation * stretch / by;
+        const double reach =
+            nearest > near ? sqrt(limit * (wide * wide + TRIP_GAUSSIAN_LOW_PASS)) : INFINITY;
+        lo[k] -= reach + 1e-6; /* for rounding */
+        hi[k] += reach + 1e-6;
+    }
+    return farthest > near;
 }
 
 /* Returns the direction of unit length in scene space that the colour belongs to. */

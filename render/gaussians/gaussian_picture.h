@@ -6,24 +6,36 @@
  *
  * Footprint (gaussian_footprint.h)
  * --------------------------------
- * Let (X, Y) be the pixel position of the centre c, z its depth and S its covariance in scene
- * space. The rows of the 2 x 3 Jacobian J of the projection are (to_x - X' forward) / z,  (to_y -
- * Y' forward) / z      in perspective to_x,  to_y                                            in
- * parallel views X' is X limited to TRIP_GAUSSIAN_CLAMP half widths from the middle of the picture,
- * and Y' is Y limited to as many half heights. That is x/z limited to 1.3 tan(fov / 2) of each
- * axis. The screen covariance in px^2 and the opacity at the centre are S2 = J S J^T +
- * TRIP_GAUSSIAN_LOW_PASS I o' = (1 - (1 - o)^opacity_scale) m,   m = sqrt(max(0.000025, |J S J^T| /
- * |S2|)) m is 1 for scenes that are not antialiased. The opacity at a pixel with its centre at p is
+ * Let (X, Y) be the pixel position of the centre, z its depth and S its covariance in scene space.
+ * The rows of the 2 x 3 Jacobian J of the projection are:
+ *
+ *     (to_x - X' forward) / z,  (to_y - Y' forward) / z      in perspective
+ *     to_x,  to_y                                            in parallel views
+ *
+ * X' is X limited to TRIP_GAUSSIAN_CLAMP half widths from the middle of the picture. Y' is Y
+ * limited to as many half heights. This limits x/z to 1.3 tan(fov / 2) of each axis. The screen
+ * covariance S2 in px^2, the opacity o' at the centre and the opacity alpha at a pixel centre p
+ * follow:
+ *
+ *     S2 = J S J^T + TRIP_GAUSSIAN_LOW_PASS I
+ *     o' = (1 - (1 - o)^opacity_scale) m,   m = sqrt(max(0.000025, |J S J^T| / |S2|))
  *     alpha(p) = min(0.99, o' exp(-q / 2)),  q = d^T S2^-1 d,  d = p - (X, Y)
- * An alpha below 1/255 counts as 0. No other bound cuts the footprint off.
+ *
+ * For scenes that are not antialiased, m is 1. An alpha below 1/255 counts as 0. No other bound
+ * cuts the footprint off.
  *
  * With the exact footprint, J is not limited. Let R and s be the rotation and the deviations, r(p)
- * the ray through p, and V = diag(s2 s3, s1 s3, s1 s2) R^T. Then
- *     q = d^T S2^-1 d |V r(X, Y)|^2 / |V r(p)|^2,
- * and alpha is 0 where V r(p) . V r(X, Y) is not positive. Without the low-pass filter, this is the
+ * the ray through p, and V = diag(s2 s3, s1 s3, s1 s2) R^T. Then:
+ *
+ *     q = d^T S2^-1 d |V r(X, Y)|^2 / |V r(p)|^2
+ *
+ * Where V r(p) . V r(X, Y) is not positive, alpha is 0. Without the low-pass filter, this is the
  * squared distance of the centre from the ray in standard deviations: the minimum along the ray. If
  * s3 is 0, the Gaussian is a flat ellipse. Then q belongs to the point where the ray meets its
  * plane. If a flat one is seen edge-on, the factor is 1.
+ *
+ * With the EWA footprint, J is not limited either, and m is sqrt(|J S J^T| / |S2|): the filter
+ * keeps the footprint's mass.
  *
  * A footprint that reaches TRIP_GAUSSIAN_REACH_MAX is left out.
  *
@@ -31,13 +43,16 @@
  * -----------
  * Gaussians are drawn in the order in which they come. The order of the definition is by depth z of
  * the centres, nearest first. Centres with z up to TRIP_GAUSSIAN_NEAR scene units in perspective,
- * and up to 0 in parallel views, are dropped. So are centres outside the clip. Front to back,
- *     colour += T alpha rgb,   T *= 1 - alpha
- * until T (1 - alpha) would fall below `early_termination`. That Gaussian and all further ones are
- * not added at this pixel. gaussian_colour.h defines rgb: display values, which are blended as they
- * are. The background comes behind everything with the remaining T.
+ * and up to 0 in parallel views, are dropped. So are centres outside the clip. Each step front to
+ * back is:
  *
- * The distance of a pixel is that of layer.h, with the depth of the centre for a splat's depth. */
+ *     colour += T alpha rgb,   T *= 1 - alpha
+ *
+ * A pixel stops when T (1 - alpha) would fall below `early_termination`. That Gaussian and all
+ * further ones are not added at this pixel. gaussian_colour.h defines rgb: display values, which
+ * are blended as they are. The background comes behind everything with the remaining T.
+ *
+ * layer.h defines the distance of a pixel. The depth of a Gaussian is the depth of its centre. */
 #ifndef TRIP_GAUSSIAN_PICTURE_H
 #define TRIP_GAUSSIAN_PICTURE_H
 
@@ -61,6 +76,7 @@
 typedef enum trip_gaussian_shape {
     TRIP_GAUSSIAN_PROJECTED, /* by the Jacobian at the centre, as scenes are trained */
     TRIP_GAUSSIAN_EXACT,     /* by the distance from each pixel's ray */
+    TRIP_GAUSSIAN_EWA,       /* by the Jacobian without limits (Zwicker et al. 2001) */
 } trip_gaussian_shape;
 
 typedef struct trip_gaussian_settings {

@@ -9,7 +9,8 @@
 #include <stdint.h>
 
 /* A tile is a square of the picture. It consists of blocks of 4 x 4 pixels, row by row, and a block
- * of 16 pixels, row by row. A tile has a plane of floats for each of these numbers. */
+ * of 16 pixels, row by row. A tile has one plane of floats for
+ * each number of the enumeration. */
 enum {
     TRIP_TILE_PX = 16,
     TRIP_TILE_PIXELS = TRIP_TILE_PX * TRIP_TILE_PX,

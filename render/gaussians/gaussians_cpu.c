@@ -293,7 +293,7 @@ static void list_rows(trip_gaussians_cpu *g)
 }
 
 /* Returns the distance from the centre to the ellipse's rightmost point where dy is in [from, to].
- * `across` and `shear` are those of the footprint, or negative for the leftmost point. */
+ * Give the negative `shear` for the distance to the leftmost point. */
 static float farthest(const trip_projected *s, float shear, float from, float to)
 {
     /* The rightmost point of the whole ellipse. Its reach_x^2 is limit (1 / across^2 + (shear /
@@ -417,6 +417,18 @@ bool trip_gaussians_cpu_is_open(const trip_gaussians_cpu *g, const double lo[2],
     return span_is_open(
         g, &(tile_span){ (uint16_t)(x.first / TRIP_TILE_PX), (uint16_t)(x.last / TRIP_TILE_PX),
                          (uint16_t)(y.first / TRIP_TILE_PX), (uint16_t)(y.last / TRIP_TILE_PX) });
+}
+
+bool trip_gaussians_cpu_needs_box(const trip_gaussians_cpu *g, const double lo[3],
+                                  const double hi[3], double deviation)
+{
+    double from[2], to[2];
+    if (!trip_gaussian_box_bounds(&g->camera, lo, hi, deviation, from, to))
+        return false;
+    /* Footprints without limits have no bounds in common. */
+    if (g->settings.shape != TRIP_GAUSSIAN_PROJECTED && !g->camera.ortho)
+        return trip_gaussians_cpu_open_tiles(g) > 0;
+    return trip_gaussians_cpu_is_open(g, from, to);
 }
 
 size_t trip_gaussians_cpu_open_tiles(const trip_gaussians_cpu *g)

@@ -44,6 +44,10 @@ int trip_gaussians_cpu_add(trip_gaussians_cpu *g, const trip_gaussian *gaussians
  * meets closed tiles changes nothing. */
 bool trip_gaussians_cpu_is_open(const trip_gaussians_cpu *g, const double lo[2],
                                 const double hi[2]);
+/* Returns whether a brick of Gaussians may change the picture. All its centres lie in the box, in
+ * scene space, and its deviations are at most `deviation`. The caller checks the clip. */
+bool trip_gaussians_cpu_needs_box(const trip_gaussians_cpu *g, const double lo[3],
+                                  const double hi[3], double deviation);
 /* Returns the number of open tiles. */
 size_t trip_gaussians_cpu_open_tiles(const trip_gaussians_cpu *g);
 

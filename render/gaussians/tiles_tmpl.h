@@ -1,5 +1,6 @@
 /* The kernel of gaussian_tiles.h for one instruction set. Each tiles_*.c defines TRIP_SIMD, then
- * includes this file. No operation is fused, so that all sets give the same bits. */
+ * includes this file. It fuses no operations, so
+ * that all sets give the same bits. */
 #ifndef TRIP_TILES_TMPL_H
 #define TRIP_TILES_TMPL_H
 
@@ -88,8 +89,11 @@ INLINE vf linear_at(const linear *l, int i, float x, float y)
     return v_set(l->at + (l->across * x + l->down * y)) + l->steps[i];
 }
 
-/* The numbers of a splat that its blocks in a tile share. q is (u^2 + v^2) / (w^2 + a^2 + b^2), and
- * infinite where w <= 0. w, a and b are set for curved splats only. */
+/* The numbers of a splat that its blocks in a tile share:
+ *
+ *     q = (u^2 + v^2) / (w^2 + a^2 + b^2)
+ *
+ * q is infinite where w <= 0. Only curved splats have w, a and b. */
 typedef struct tile_splat {
     linear u, v, w, a, b;
     int left, right, top, bottom; /* blocks; empty if left > right or top > bottom */

@@ -2,11 +2,13 @@
  *
  *     draw_dump IN OUT RENDERER [THREADS [BATCH [ISA [REPEATS]]]]
  *
- * IN holds little-endian doubles: width, height, ortho height, fov, eye, look, up, degree,
- * antialiased, opacity scale, depth, exact, then 59 numbers for each Gaussian in the order of
- * drawing: centre, deviations, rotation, opacity, 16 coefficients of 3 channels. OUT gets 4 floats
- * for each pixel, then the distances with depth. RENDERER is cpu or reference. With REPEATS it
- * prints the times of the fastest picture. */
+ * IN holds little-endian doubles.
+ * - A view: width, height, ortho height, fov, eye, look, up.
+ * - Settings: degree, antialiased, opacity scale, depth, shape.
+ * - Each Gaussian in the order of drawing: centre, deviations, rotation, opacity, 48 coefficients.
+ *
+ * OUT gets 4 floats for each pixel, then the distances with depth. RENDERER is cpu or reference.
+ * With REPEATS it draws again and prints the times. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -92,9 +94,11 @@ static void read_scene(run *r, const char *path)
     const trip_affine identity = trip_affine_identity();
     if (trip_camera_make(&r->camera, &params, &identity))
         exit(1);
-    r->settings = (trip_gaussian_settings){
-        .degree = (int)h[13], .antialiased = h[14] != 0, .opacity_scale = h[15], .depth = h[16] != 0
-    };
+    r->settings = (trip_gaussian_settings){ .degree = (int)h[13],
+                                            .antialiased = h[14] != 0,
+                                            .opacity_scale = h[15],
+                                            .depth = h[16] != 0,
+                                            .shape = (trip_gaussian_shape)h[17] };
     double n[NUMBERS];
     for (size_t room = 0; fread(n, sizeof *n, NUMBERS, in) == NUMBERS; r->count++) {
         if (r->count == room) {

@@ -210,6 +210,18 @@ static void an_exact_flat_gaussian_is_where_rays_meet_its_plane(void **state)
     assert_true(met > 60);
 }
 
+static void an_ewa_footprint_is_not_limited_and_keeps_its_mass(void **state)
+{
+    (void)state;
+    const trip_camera c = camera_of(200, 0);
+    const trip_gaussian_settings ewa = { .shape = TRIP_GAUSSIAN_EWA };
+    const trip_gaussian g = round_at(-40, 0, 10, 0.05); /* at 4 times the half angle */
+    const trip_gaussian_footprint f = drawn(&c, &ewa, &g);
+    assert_close(variance_x(&f), 0.25 * 17 + 0.3, 1e-6);
+    assert_close(variance_y(&f), 0.25 + 0.3, 1e-6);
+    assert_close(f.opacity, 0.5 * sqrt(4.25 * 0.25 / (4.55 * 0.55)), 1e-6);
+}
+
 /* Along a ray, the squared distance in deviations has its minimum q. The minimum is found by small
  * steps. */
 static void an_exact_gaussian_is_the_minimum_along_the_ray(void **state)
@@ -354,6 +366,7 @@ int main(void)
         cmocka_unit_test(an_opacity_scale_multiplies_the_optical_depth_at_the_centre),
         cmocka_unit_test(faint_near_and_clipped_gaussians_are_not_drawn),
         cmocka_unit_test(an_exact_flat_gaussian_is_where_rays_meet_its_plane),
+        cmocka_unit_test(an_ewa_footprint_is_not_limited_and_keeps_its_mass),
         cmocka_unit_test(an_exact_gaussian_is_the_minimum_along_the_ray),
         cmocka_unit_test(bounds_of_an_exact_gaussian_are_tight),
         cmocka_unit_test(unusable_numbers_draw_nothing),

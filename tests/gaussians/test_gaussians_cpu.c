@@ -377,6 +377,62 @@ static void exact_footprints_agree_with_the_reference(void **state)
     expect_the_reference(&parallel, &exact);
 }
 
+/* Draws the Gaussians of each box of a grid alone. Returns the number of boxes that are not needed,
+ * and checks that they draw nothing. */
+static int boxes_without_need(const trip_camera *c, const trip_gaussian_settings *s)
+{
+    enum { CELLS = 7 };
+    static trip_gaussian inside[SCENE];
+    const trip_gaussian *scene = random_scene();
+    int without = 0;
+    for (int cell = 0; cell < CELLS * CELLS * CELLS; cell++) {
+        double lo[3], hi[3], deviation = 0;
+        size_t count = 0;
+        for (int k = 0; k < 3; k++) {
+            const int at = k == 0   ? cell % CELLS
+                           : k == 1 ? cell / CELLS % CELLS
+                                    : cell / CELLS / CELLS;
+            lo[k] = k < 2 ? -20 + 40.0 * at / CELLS : 21.0 * at / CELLS;
+            hi[k] = lo[k] + (k < 2 ? 40.0 : 21.0) / CELLS;
+        }
+        for (int i = 0; i < SCENE; i++) {
+            const trip_gaussian *g = &scene[i];
+            bool in = true;
+            for (int k = 0; k < 3; k++)
+                in &= g->centre[k] >= lo[k] && g->centre[k] <= hi[k];
+            for (int k = 0; k < 3 && in; k++)
+                deviation = fmax(deviation, (double)g->deviations[k]);
+            if (in)
+                inside[count++] = *g;
+        }
+        trip_budget *budget;
+        trip_gaussians_cpu *g;
+        assert_int_equal(trip_budget_create(&budget, 2u << 20), 0);
+        assert_int_equal(
+            trip_gaussians_cpu_begin(
+                &g, &(trip_gaussians_cpu_params){ .camera = c, .settings = s, .budget = budget }),
+            0);
+        const bool needed = trip_gaussians_cpu_needs_box(g, lo, hi, deviation);
+        assert_int_equal(trip_gaussians_cpu_add(g, inside, count), 0);
+        if (!needed)
+            assert_int_equal(trip_gaussians_cpu_get_stats(g).drawn, 0);
+        without += !needed && count > 0;
+        trip_gaussians_cpu_end(g);
+        trip_budget_destroy(budget);
+    }
+    return without;
+}
+
+static void boxes_that_are_not_needed_draw_nothing(void **state)
+{
+    (void)state;
+    const trip_camera c = camera_of(0), parallel = camera_of(3);
+    assert_true(boxes_without_need(&c, &full) > 10);
+    assert_true(boxes_without_need(&parallel, &full) > 50);
+    assert_int_equal(boxes_without_need(&c, &exact), 0);
+    assert_true(boxes_without_need(&parallel, &exact) > 50);
+}
+
 /* One unusable number must not reach other pixels of a vector. */
 static void unusable_colours_stay_in_their_pixels(void **state)
 {
@@ -412,6 +468,7 @@ int main(void)
         cmocka_unit_test(perspective_agrees_with_the_reference),
         cmocka_unit_test(parallel_views_agree_with_the_reference),
         cmocka_unit_test(exact_footprints_agree_with_the_reference),
+        cmocka_unit_test(boxes_that_are_not_needed_draw_nothing),
         cmocka_unit_test(unusable_colours_stay_in_their_pixels),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
