@@ -185,7 +185,7 @@ static bool tell_ply(const file *f)
     if (strstr(head, " scale_0") || strstr(head, " rot_0") || strstr(head, " f_dc_0"))
         SAY("is a scene of %.0f Gaussian splats (PLY), not a volume" DESCRIBED, points);
     else if (strstr(head, "\nelement chunk ") && strstr(head, "packed_position"))
-        SAY("is a compressed scene of Gaussian splats (PLY), not a volume; SuperSplat opens it");
+        SAY("is a compressed scene of Gaussian splats (PLY), not a volume" DESCRIBED);
     else if (ply_count(head, "face") > 0 || ply_count(head, "tristrips") > 0)
         SAY("is a mesh (PLY) of %.0f vertices, not a volume; MeshLab or ParaView opens it", points);
     else
@@ -547,7 +547,7 @@ static bool tell_name(const file *f)
         const char *suffix, *text;
     } names[] = {
         { ".splat", "is a scene of Gaussian splats (.splat), not a volume" DESCRIBED },
-        { ".ksplat", "is a scene of Gaussian splats (.ksplat), not a volume; SuperSplat opens it" },
+        { ".ksplat", "is a scene of Gaussian splats (.ksplat), not a volume" DESCRIBED },
         { ".3ds", "is a mesh (3DS), not a volume; Blender or MeshLab opens it" },
         { ".fbx", "is a scene of meshes (FBX), not a volume; Blender opens it" },
         { ".mat", "is a MATLAB file (v4); MATLAB, GNU Octave or Python's scipy.io reads it" },
