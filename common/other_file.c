@@ -329,8 +329,8 @@ static bool tell_zip(const file *f)
     if (ends_in(f, ".npz"))
         SAY("is an archive of NumPy arrays (.npz); Python's numpy.load reads them, and tofile() "
             "writes raw data");
-    else if (ends_in(f, ".sog"))
-        SAY("is a scene of Gaussian splats (SOG), not a volume; SuperSplat opens it");
+    else if (ends_in(f, ".sog") || holds(f, "means_l.webp"))
+        SAY("is a scene of Gaussian splats (SOG), not a volume" DESCRIBED);
     else
         SAY("is a ZIP archive; unpack it with `unzip FILE`, then give a file or folder of it");
     return true;
@@ -472,6 +472,10 @@ static trip_other_kind tell_own_text(const file *f)
         SAY("is a transfer function; --tf FILE draws with it, and `triptych tf show FILE` prints "
             "it");
         return TRIP_OTHER_FUNCTION;
+    }
+    if (begins(f, "{") && holds(f, "\"means\"") && holds(f, "\"sh0\"") && holds(f, ".webp")) {
+        SAY("is a scene of Gaussian splats (SOG), not a volume" DESCRIBED);
+        return TRIP_OTHER_FOREIGN;
     }
     if (is_script(f)) {
         SAY("is a script for the viewer; `triptych view VOLUME --script FILE` replays it");

@@ -16,6 +16,7 @@ static const trip_gaussian_reader *const readers[] = {
     &trip_read_compressed_ply,
     &trip_read_gaussian_ply,
     &trip_read_spz,
+    &trip_read_sog,
     /* without a magic number: */
     &trip_read_splat,
     &trip_read_ksplat,
