@@ -168,6 +168,15 @@ static double ply_count(const char *head, const char *element)
     return at && sscanf(at + strlen(line), "%lf", &count) == 1 ? count : -1;
 }
 
+/* Gaussian splats in glTF. Other tests tell meshes. */
+static bool tell_gltf(const file *f)
+{
+    if ((!begins(f, "glTF") && !ends_in(f, ".gltf")) || !holds(f, "\"KHR_gaussian_splatting\""))
+        return false;
+    SAY("is a scene of Gaussian splats (glTF), not a volume" DESCRIBED);
+    return true;
+}
+
 /* Tells meshes, points and Gaussian splats apart by the header. */
 static bool tell_ply(const file *f)
 {
@@ -585,7 +594,7 @@ static trip_other_kind tell(const file *f)
         SAY("is the index of a data set; give the folder that holds it");
         return TRIP_OTHER_INDEX;
     }
-    if (tell_ply(f) || tell_numpy(f) || tell_mrc(f) || tell_pcd(f) || tell_zip(f) ||
+    if (tell_gltf(f) || tell_ply(f) || tell_numpy(f) || tell_mrc(f) || tell_pcd(f) || tell_zip(f) ||
         tell_marks(f) || tell_short_marks(f) || tell_analyze(f))
         return TRIP_OTHER_FOREIGN;
     if (is_text(f) && !(begins(f, "solid") && holds(f, "facet")))

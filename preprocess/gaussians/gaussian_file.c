@@ -17,6 +17,7 @@ static const trip_gaussian_reader *const readers[] = {
     &trip_read_gaussian_ply,
     &trip_read_spz,
     &trip_read_sog,
+    &trip_read_gltf_gaussians,
     /* without a magic number: */
     &trip_read_splat,
     &trip_read_ksplat,

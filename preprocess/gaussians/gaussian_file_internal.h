@@ -33,7 +33,7 @@ struct trip_gaussian_file {
 };
 
 extern const trip_gaussian_reader trip_read_gaussian_ply, trip_read_compressed_ply, trip_read_spz,
-    trip_read_splat, trip_read_ksplat, trip_read_sog;
+    trip_read_splat, trip_read_ksplat, trip_read_sog, trip_read_gltf_gaussians;
 
 /* Constant term of the spherical harmonics: 1 / (2 sqrt(pi)). */
 #define TRIP_SH_CONSTANT 0.28209479177387814

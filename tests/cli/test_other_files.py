@@ -126,6 +126,11 @@ SCENES = [
     ("a.spz", gzip.compress(b"NGSP" + bytes(60)), "Gaussian splats (SPZ)"),
     ("b.spz", b"NGSP\4\0\0\0" + bytes(60), "Gaussian splats (SPZ)"),
     ("a.splat", struct.pack("<6f8B", *[1.5] * 6, *range(8)), "Gaussian splats (.splat)"),
+    ("a.sog", archive(zipfile.ZipFile, "w"), "Gaussian splats (SOG)"),
+    ("meta.json", b'{"means": {"files": ["a.webp"]}, "sh0": 1}', "Gaussian splats (SOG)"),
+    ("a.glb", b'glTF\2\0\0\0' + bytes(12) + b'{"extensionsUsed": ["KHR_gaussian_splatting"]}',
+     "Gaussian splats (glTF)"),
+    ("a.gltf", b'{"extensionsUsed": ["KHR_gaussian_splatting"]}', "Gaussian splats (glTF)"),
     ("a.ksplat", bytes([0, 1]) + bytes(5000), "Gaussian splats (.ksplat)"),
 ]
 

@@ -65,12 +65,15 @@ class Read:
             self.antialiased, self.flat = anti == "1", flat == "1"
 
 
-def covariance(deviations, q):
+def covariance_root(q):
     w, x, y, z = q.T
-    r = np.array([[1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+    return np.array([[1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
                   [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-                  [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]])
-    m = r.transpose(2, 0, 1) * deviations[:, None]
+                  [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]]).transpose(2, 0, 1)
+
+
+def covariance(deviations, q):
+    m = covariance_root(q) * deviations[:, None]
     return m @ m.transpose(0, 2, 1)
 
 
@@ -354,6 +357,79 @@ def archive(parts, method=zipfile.ZIP_STORED):
         for name, data in parts.items():
             z.writestr(name, data)
     return out.getvalue()
+
+
+EXTENSION = "KHR_gaussian_splatting"
+GLTF_TYPES = {"f4": 5126, "i1": 5120, "u1": 5121, "i2": 5122, "u2": 5123}
+
+
+def gltf(s, types=None, interleaved=False, node=None, scenes=True, **members):
+    """Returns the JSON and the buffer of a scene. `types` gives other types than floats to
+    attributes; whole numbers are normalised."""
+    columns = {"POSITION": s.centre, EXTENSION + ":ROTATION": np.roll(s.rotation, -1, axis=1),
+               EXTENSION + ":SCALE": s.deviations, EXTENSION + ":OPACITY": s.opacity[:, None]}
+    for k in range((s.degree + 1) ** 2):
+        degree = int(np.sqrt(k))
+        columns[f"{EXTENSION}:SH_DEGREE_{degree}_COEF_{k - degree * degree}"] = s.sh[:, k]
+    packed = {}
+    for name, v in columns.items():
+        kind = (types or {}).get(name.split(":")[-1], "f4")
+        if kind[0] != "f":
+            v = np.rint(v * np.iinfo(kind).max)
+        packed[name] = v.astype("<" + kind)
+    accessors, views, data, attributes = [], [], b"", {}
+    if interleaved:
+        rows = [np.ascontiguousarray(v).view("u1").reshape(len(v), -1) for v in packed.values()]
+        rows = [np.pad(r, ((0, 0), (0, -r.shape[1] % 4))) for r in rows]
+        at = np.cumsum([0] + [r.shape[1] for r in rows])
+        data = b"head" + np.concatenate(rows, axis=1).tobytes()
+        views = [{"buffer": 0, "byteOffset": 4, "byteLength": len(data) - 4, "byteStride": int(at[-1])}]
+    for i, (name, v) in enumerate(packed.items()):
+        if interleaved:
+            where = {"bufferView": 0, "byteOffset": int(at[i])}
+        else:
+            stride = {"byteStride": v[0].nbytes}
+            views.append({"buffer": 0, "byteOffset": len(data), "byteLength": v.nbytes, **stride})
+            data += v.tobytes() + bytes(-v.nbytes % 4)
+            where = {"bufferView": i}
+        attributes[name] = i
+        accessors.append({**where, "componentType": GLTF_TYPES[v.dtype.str[1:]], "count": len(v),
+                          "normalized": v.dtype.kind != "f",
+                          "type": {1: "SCALAR", 3: "VEC3", 4: "VEC4"}[v.shape[1]]})
+    text = {"asset": {"version": "2.0", "generator": "test 2"}, "extensionsUsed": [EXTENSION],
+            "buffers": [{"byteLength": len(data)}], "bufferViews": views, "accessors": accessors,
+            "meshes": [{"primitives": [{"mode": 0, "attributes": attributes, "extensions": {
+                EXTENSION: {"kernel": "ellipse", "colorSpace": "srgb_rec709_display"}}}]}],
+            "nodes": [{"mesh": 0, **(node or {})}]}
+    if scenes:
+        text.update({"scene": 0, "scenes": [{"nodes": [0]}]})
+    return {**text, **members}, data
+
+
+def glb(text, data):
+    text = json.dumps(text).encode()
+    text += b" " * (-len(text) % 4)
+    return (struct.pack("<4sIIII", b"glTF", 2, 28 + len(text) + len(data), len(text), 0x4E4F534A) + text +
+            struct.pack("<II", len(data), 0x004E4942) + data)
+
+
+def harmonics(d):
+    """The real spherical harmonics of unit directions, as trainers use them, to degree 3."""
+    x, y, z = d.T
+    return np.stack([
+        0.28209479177387814 + 0 * x, -0.4886025119029199 * y, 0.4886025119029199 * z,
+        -0.4886025119029199 * x, 1.0925484305920792 * x * y, -1.0925484305920792 * y * z,
+        0.31539156525252005 * (2 * z * z - x * x - y * y), -1.0925484305920792 * x * z,
+        0.5462742152960396 * (x * x - y * y), -0.5900435899266435 * y * (3 * x * x - y * y),
+        2.890611442640554 * x * y * z, -0.4570457994644658 * y * (4 * z * z - x * x - y * y),
+        0.3731763325901154 * z * (2 * z * z - 3 * x * x - 3 * y * y),
+        -0.4570457994644658 * x * (4 * z * z - x * x - y * y), 1.445305721320277 * z * (x * x - y * y),
+        -0.5900435899266435 * x * (x * x - 3 * y * y)], axis=1)
+
+
+def matrix(q):
+    """The rotation matrix of a quaternion from x on."""
+    return covariance_root(np.roll(np.array([q]), 1, axis=1))[0]
 
 
 class GaussianFile(unittest.TestCase):
@@ -651,6 +727,106 @@ class GaussianFile(unittest.TestCase):
         self.refuses("o.sog", changed(means={**meta["means"], "mins": [0, "x", 1]}), "means.mins")
         self.refuses("p.sog", archive({**parts, "shN_centroids.webp": parts["quats.webp"]}), "pixels wide")
         self.refuses("q.sog", changed(count=0), "holds no Gaussians")
+
+    def test_gltf_of_each_degree_holds_its_values(self):
+        for degree in range(4):
+            s = Scene(degree)
+            r = self.read("a.glb", glb(*gltf(s)))
+            self.agree(r, s)
+            self.assertEqual((r.format, r.up, r.trainer), ("glTF", "y", "test 2"))
+            if degree < 3:
+                self.agree(self.read("b.glb", glb(*gltf(s, interleaved=True))), s)
+        self.agree(self.read("c.glb", glb(*gltf(s, scenes=False))), s)
+
+    def test_gltf_may_hold_whole_numbers_and_a_file_beside_it(self):
+        s = Scene(0)
+        s.deviations /= s.deviations.max()
+        types = {"ROTATION": "i2", "SCALE": "u2", "OPACITY": "u1"}
+        self.agree(self.read("a.glb", glb(*gltf(s, types))), s, deviation=0.51 / 65535 / s.deviations.min(),
+                   rotation=1e-4, opacity=0.51 / 255)
+        text, data = gltf(s, {"ROTATION": "i1"})
+        text["buffers"][0]["uri"] = "the%20data.bin"
+        self.path("the data.bin", data)
+        self.agree(self.read("a.gltf", json.dumps(text).encode()), s, rotation=0.02)
+
+    def test_nodes_of_gltf_move_turn_and_scale_gaussians_and_turn_their_colours(self):
+        s = Scene(3)
+        q = np.array([0.5, -0.3, 0.2, 0.8])
+        q /= np.linalg.norm(q)
+        directions = np.random.default_rng(9).normal(size=(20, 3))
+        directions /= np.linalg.norm(directions, axis=1)[:, None]
+        colours = np.einsum("dk,nkc->ndc", harmonics(directions), s.sh)
+        for scale in [2.5, 2.5, 2.5], [0.5, 3, 1.2]:
+            m = matrix(q) * scale
+            node = {"translation": [1, -2, 3], "rotation": list(q), "scale": scale}
+            columns = np.concatenate([np.concatenate([m, [[1], [-2], [3]]], axis=1), [[0, 0, 0, 1]]]).T
+            for node in node, {"matrix": list(columns.flat)}:
+                r = self.read("a.glb", glb(*gltf(s, node=node)))
+                np.testing.assert_allclose(r.centre, s.centre @ m.T + [1, -2, 3], rtol=1e-5, atol=1e-5)
+                wanted = m @ covariance(s.deviations, s.rotation) @ m.T
+                off = np.abs(covariance(r.deviations, r.rotation) - wanted).max(axis=(1, 2))
+                self.assertLess((off / np.trace(wanted, axis1=1, axis2=2)).max(), 1e-5)
+                turned = np.einsum("dk,nkc->ndc", harmonics(directions @ matrix(q).T), r.sh)
+                np.testing.assert_allclose(turned, colours, atol=1e-5)
+
+    def test_gltf_nodes_hold_several_scenes(self):
+        s = Scene(1, 600)
+        text, data = gltf(s)
+        text["nodes"] = [{"children": [1, 2]}, {"mesh": 0}, {"mesh": 0, "translation": [10, 0, 0]}]
+        r = self.read("a.glb", glb(text, data))
+        self.assertEqual(r.count, 1200)
+        np.testing.assert_allclose(r.centre, np.concatenate([s.centre, s.centre + [10, 0, 0]]), rtol=1e-6, atol=1e-6)
+
+    def test_flat_gaussians_stay_flat_under_uneven_scales(self):
+        s = Scene(0, 200)
+        s.deviations[:100, 1] = 0
+        s.deviations[50:, 2] = 0
+        s.deviations[190:] = 0
+        m = np.diag([1, 4, 0.25])
+        r = self.read("a.glb", glb(*gltf(s, node={"scale": [1, 4, 0.25]})))
+        wanted = m @ covariance(s.deviations, s.rotation) @ m
+        np.testing.assert_allclose(np.linalg.norm(r.rotation, axis=1), 1, atol=1e-6)
+        np.testing.assert_allclose(covariance(r.deviations, r.rotation), wanted, atol=3e-5)
+
+    def test_damaged_gltf_is_refused_in_one_line(self):
+        s = Scene(1, 9)
+        text, data = gltf(s)
+        good = glb(text, data)
+
+        def changed(name, value, *path):
+            made = copy.deepcopy(text)
+            at = made
+            for key in path:
+                at = at[key]
+            at[name] = value
+            return glb(made, data)
+        self.refuses("a.glb", good[:-1], "is it truncated?")
+        self.refuses("b.glb", good[:4] + b"\1" + good[5:], "version 2")
+        self.refuses("c.glb", good.replace(b'"asset"', b'"asset""', 1), "not JSON")
+        self.refuses("d.glb", changed("count", 1e15, "accessors", 2), "beyond its buffer")
+        self.refuses("e.glb", changed("count", -1, "accessors", 2), "no valid accessor")
+        self.refuses("f.glb", changed("count", 8, "accessors", 2), "8 rows")
+        self.refuses("g.glb", changed("byteOffset", 1e9, "accessors", 2), "beyond its buffer")
+        self.refuses("h.glb", changed("byteLength", 1e9, "buffers", 0), "is it truncated?")
+        self.refuses("i.glb", changed("byteStride", 1, "bufferViews", 0), "byteStride")
+        self.refuses("j.glb", changed("buffer", 3, "bufferViews", 0), "no valid buffer")
+        self.refuses("k.glb", changed("sparse", {}, "accessors", 0), "sparse")
+        self.refuses("l.glb", changed("type", "VEC4", "accessors", 0), "VEC3 is read")
+        self.refuses("m.glb", changed("extensionsRequired", [EXTENSION, "EXT_meshopt_compression"]),
+                     "EXT_meshopt_compression")
+        self.refuses("n.glb", changed("nodes", [{"children": [0], "mesh": 0}]), "nested too deep")
+        self.refuses("o.glb", changed("nodes", [{"children": [7]}]), "node 7")
+        self.refuses("p.glb", changed("scale", [1, -1, 1], "nodes", 0), "mirrors")
+        self.refuses("q.glb", changed("uri", "data:application/octet-stream;base64,AAAA", "buffers", 0), "no file")
+        for lost in "OPACITY", "SH_DEGREE_1_COEF_1", "SH_DEGREE_1_COEF_2":
+            made = copy.deepcopy(text)
+            del made["meshes"][0]["primitives"][0]["attributes"][f"{EXTENSION}:{lost}"]
+            self.refuses("r.glb", glb(made, data), "lacks" if lost[-1] != "2" else "3 coefficients")
+
+    def test_linear_colours_are_a_warning(self):
+        text, data = gltf(Scene(0, 5))
+        text["meshes"][0]["primitives"][0]["extensions"][EXTENSION]["colorSpace"] = "lin_rec709_display"
+        self.assertIn("linear colours", self.read("a.glb", glb(text, data)).lines[0])
 
     def test_files_of_another_program_hold_the_same_gaussians(self):
         """The colours are bytes around 85 and 170. The red channel follows x, the green one z."""
