@@ -1,6 +1,7 @@
-/* Reads Gaussian scenes in PlayCanvas' compressed PLY: chunks of 256 Gaussians with bounds of
- * centres, log scales and perhaps colours, then four words for each Gaussian, then perhaps a byte
- * for each higher coefficient. A stream for each element keeps memory bounded. */
+/* Reads Gaussian scenes in the compressed PLY of PlayCanvas. The first element has bounds of
+ * centres, log scales and perhaps colours, for each 256 Gaussians. The second one has four words
+ * for each Gaussian. A third one may have a byte for each coefficient of a degree above 0. A stream
+ * for each element keeps memory bounded. */
 #include "gaussian_file_internal.h"
 
 #include <inttypes.h>

@@ -180,7 +180,7 @@ static double value(const ply *p, property from, const unsigned char *row)
     return trip_ply_value(&p->header, from, row);
 }
 
-/* Adds the blur of Mip-Splatting's smoothing filter to a Gaussian, whose total weight stays. */
+/* Adds the smoothing filter of Mip-Splatting to a Gaussian. Its total weight stays. */
 static void widen(trip_gaussian *g, double filter)
 {
     double before = 1, after = 1;

@@ -15,9 +15,9 @@
 
 enum { HEADER_BYTES = 4096, SECTION_BYTES = 1024, SECTION_USED = 44, ROWS = 1024, ROW_MAX = 224 };
 
-/* Of the values in a row, by level. Colour and opacity have a byte each. */
+/* The bytes of a number, by level. Red, green, blue and opacity have a byte each. */
 typedef struct layout {
-    unsigned centre, scale, rotation, harmonic; /* bytes of one number */
+    unsigned centre, scale, rotation, harmonic;
 } layout;
 
 static const layout layouts[] = { { 4, 4, 4, 4 }, { 2, 2, 2, 2 }, { 2, 2, 2, 1 } };

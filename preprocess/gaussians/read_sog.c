@@ -1,6 +1,6 @@
 /* Reads Gaussian scenes in SOG (PlayCanvas): meta.json and pictures in WebP, in a ZIP archive or in
- * a folder. A pixel of each picture belongs to one Gaussian. WebP can only be read as a whole, so
- * the pictures stay in memory: 20 bytes for each Gaussian, and 4 more with harmonics. */
+ * a folder. A pixel of each picture belongs to one Gaussian. WebP is read as a whole, so the
+ * pictures stay in memory. They take 20 bytes for each Gaussian, and 4 more with harmonics. */
 #include "gaussian_file_internal.h"
 
 #include <cjson/cJSON.h>

@@ -329,7 +329,7 @@ def sog(s, version=2, model=None):
     parts["sh0.webp"] = webp(np.concatenate([colours, opacity[:, None].astype("u1")], axis=1))
     if s.degree:
         n = (s.degree + 1) ** 2 - 1
-        entries = 100 if version == 2 else count
+        entries = min(100, count) if version == 2 else count
         palette = s.sh[:entries, 1:n + 1]
         meta["shN"] = {"bands": s.degree, "count": entries,
                        "files": ["shN_centroids.webp", "shN_labels.webp"]}
