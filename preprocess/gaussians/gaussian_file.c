@@ -13,7 +13,14 @@
 enum { HEAD_BYTES = 1 << 18 };
 
 static const trip_gaussian_reader *const readers[] = {
-    &trip_read_gaussian_ply, &trip_read_spz, &trip_read_splat, /* has no magic number */
+    &trip_read_compressed_ply,
+    &trip_read_gaussian_ply,
+    &trip_read_spz,
+    &trip_read_sog,
+    &trip_read_gltf_gaussians,
+    /* without a magic number: */
+    &trip_read_splat,
+    &trip_read_ksplat,
 };
 
 bool trip_gaussian_suffix(const char *path, const char *suffix)

@@ -32,7 +32,8 @@ struct trip_gaussian_file {
     bool warned;
 };
 
-extern const trip_gaussian_reader trip_read_gaussian_ply, trip_read_spz, trip_read_splat;
+extern const trip_gaussian_reader trip_read_gaussian_ply, trip_read_compressed_ply, trip_read_spz,
+    trip_read_splat, trip_read_ksplat, trip_read_sog, trip_read_gltf_gaussians;
 
 /* Constant term of the spherical harmonics: 1 / (2 sqrt(pi)). */
 #define TRIP_SH_CONSTANT 0.28209479177387814
@@ -47,6 +48,10 @@ static inline float trip_sh_of_colour(double colour)
 {
     return (float)((colour - 0.5) / TRIP_SH_CONSTANT);
 }
+
+struct trip_ply_header;
+/* Sets the parts of f->info that comments of a PLY tell: trainer, antialiasing and axis. */
+void trip_ply_describe(const struct trip_ply_header *h, trip_gaussian_file *f);
 
 /* Returns whether a file name ends in a suffix, also before ".gz" or ".bz2". */
 bool trip_gaussian_suffix(const char *path, const char *suffix);

@@ -148,7 +148,6 @@ static void parse_comment(trip_ply_header *h, char *text)
     snprintf(h->comments + used, sizeof h->comments - used, "%s%s", used && *text ? "; " : "",
              text);
     if ((value = after(text, "SplatRenderMode:"))) { /* Brush */
-        snprintf(h->render_mode, sizeof h->render_mode, "%s", value);
         h->antialiased = !strcasecmp(value, "mip");
     } else if ((value = after(text, "antialiased "))) { /* Postshot */
         h->antialiased = *value == '1';

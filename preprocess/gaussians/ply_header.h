@@ -34,8 +34,8 @@ typedef struct trip_ply_header {
     uint32_t element_count, property_count;
     trip_ply_property *properties;
     char comments[256]; /* separated by "; " */
-    char render_mode[16], up[3];
-    int antialiased; /* -1 if no comment tells */
+    char up[3];         /* the axis that points up, or "" */
+    int antialiased;    /* -1 if no comment tells */
 } trip_ply_header;
 
 /* Reads and parses the header of a file. Faults are reported. Release it after a failure too. */

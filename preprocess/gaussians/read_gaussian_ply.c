@@ -133,16 +133,23 @@ static int find_properties(trip_gaussian_file *f, ply *p)
     return status < 0 ? status : find_rest(f, p);
 }
 
+void trip_ply_describe(const trip_ply_header *h, trip_gaussian_file *f)
+{
+    snprintf(f->info.trainer, sizeof f->info.trainer, "%s", h->comments);
+    f->info.antialiased = h->antialiased == 1;
+    if (*h->up)
+        memcpy(f->info.up, h->up, sizeof f->info.up);
+}
+
 static void describe(trip_gaussian_file *f, const ply *p)
 {
     const trip_ply_header *h = &p->header;
     f->info.flat = !p->scales[2];
     f->info.format = f->info.flat ? "2DGS PLY" : "3DGS PLY";
     f->info.count = p->vertex->count;
-    f->info.antialiased = !f->info.flat && (h->antialiased >= 0 ? h->antialiased : p->filter != 0);
-    snprintf(f->info.trainer, sizeof f->info.trainer, "%s", h->comments);
-    if (*h->up)
-        memcpy(f->info.up, h->up, sizeof f->info.up);
+    trip_ply_describe(h, f);
+    f->info.antialiased =
+        !f->info.flat && (h->antialiased < 0 ? p->filter != NULL : h->antialiased != 0);
 }
 
 static int open_ply(trip_gaussian_file *f)
@@ -160,6 +167,8 @@ static int open_ply(trip_gaussian_file *f)
     if (status < 0)
         return status;
     describe(f, p);
+    if (f->info.count == 0)
+        return 0;
     p->room = BUFFER_BYTES / p->vertex->row_bytes + 1;
     if (!(p->rows = malloc(p->room * p->vertex->row_bytes)))
         return trip_gaussian_no_memory(f);
@@ -171,7 +180,7 @@ static double value(const ply *p, property from, const unsigned char *row)
     return trip_ply_value(&p->header, from, row);
 }
 
-/* Adds the blur of Mip-Splatting's smoothing filter to a Gaussian, whose total weight stays. */
+/* Adds the smoothing filter of Mip-Splatting to a Gaussian. Its total weight stays. */
 static void widen(trip_gaussian *g, double filter)
 {
     double before = 1, after = 1;
