@@ -109,9 +109,9 @@ static int each_list(triptych *t,
                      void (*one)(void *user, const char *name, const triptych_list_stats *s),
                      void *user)
 {
-    triptych_info info;
+    triptych_info info = { 0 };
     triptych_frame_stats frame;
-    int status = triptych_get_info(t, &info);
+    int status = triptych_is_scene(t) ? 0 : triptych_get_info(t, &info);
     if (!status)
         status = triptych_get_frame_stats(t, &frame);
     for (unsigned i = 0; !status && i < info.lists; i++) {
@@ -351,8 +351,11 @@ int render_stats_explain_plan(triptych *t, FILE *out)
 }
 
 /* Returns the name for the records that were read. */
-static const char *things_read(const render_options *o, const triptych_frame_stats *frame)
+static const char *things_read(const render_options *o, const triptych *t,
+                               const triptych_frame_stats *frame)
 {
+    if (triptych_is_scene(t))
+        return "Gaussians";
     const bool splats = o->resources.renderer == TRIPTYCH_RENDERER_INTEGRAL
                             ? o->field == RENDER_FIELD_SPLATS
                             : frame->classify == TRIPTYCH_CLASSIFY_PRE;
@@ -379,7 +382,7 @@ int render_stats_explain_cost(const render_options *o, triptych *t, FILE *out)
     char bytes[32], memory[32];
     triptych_frame_stats frame;
     int status = triptych_get_frame_stats(t, &frame);
-    costs c = { out, status ? "" : things_read(o, &frame) };
+    costs c = { out, status ? "" : things_read(o, t, &frame) };
     if (!status)
         status = each_list(t, explain_list, &c);
     if (status)
@@ -445,7 +448,7 @@ int render_stats_summary(const char *path, const render_options *o, triptych *t,
         return status;
     trip_text_write(out, path);
     fprintf(out, ": %d x %d, %s %s, %s read, %.2f s", o->view.view.width, o->view.view.height,
-            size_print_count(frame.splats, count), things_read(o, &frame),
+            size_print_count(frame.splats, count), things_read(o, t, &frame),
             trip_format_bytes(frame.bytes_read, text), frame.ms * 1e-3);
     write_promise(&frame, out);
     fputc('\n', out);

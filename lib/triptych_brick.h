@@ -304,6 +304,11 @@ TRIPTYCH_API int triptych_is_gaussians(triptych *t, const char *path);
 /* Reads a Gaussian scene and describes it. */
 TRIPTYCH_API int triptych_describe_gaussians(triptych *t, const char *path,
                                              triptych_gaussians *out);
+/* Bricks a Gaussian scene. Of the options, only `replace` and `memory_bytes` apply. *out describes
+ * the scene; NULL is allowed. */
+TRIPTYCH_API int triptych_brick_gaussians(triptych *t, const char *path, const char *data_set,
+                                          const triptych_brick_options *options,
+                                          triptych_gaussians *out);
 
 /* The range of a part of a volume's values. */
 typedef struct triptych_values {
