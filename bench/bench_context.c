@@ -99,7 +99,7 @@ int bench_context_picture(bench_context *c, int width, int height, float **rgba)
 int bench_context_draw(bench_context *c, double lod_px, int samples, float *rgba, double *ms)
 {
     measure_progress_step(c->progress, lod_px > 0 ? "coarse levels" : "finest level");
-    c->settings.lod.voxel_px = lod_px;
+    c->settings.lod.voxel_px = lod_px > 0 ? lod_px : TRIPTYCH_ZERO;
     c->settings.all.samples = samples;
     int status = draw_settings_use(c->t, &c->settings);
     const double start = trip_now_ms();

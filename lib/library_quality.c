@@ -9,7 +9,7 @@
 #include "quality_trial.h"
 #include "report.h"
 
-enum { CODES = 65536, EXACT_RAYS_MIN = 2, EXACT_RAYS_MAX = 8 };
+enum { CODES = 65536, EXACT_RAYS_MIN = 4, EXACT_RAYS_MAX = 16 };
 /* Raise it if trials choose otherwise: stored choices then count as unknown. */
 #define TRIAL_VERSION 2u
 
@@ -161,10 +161,10 @@ static int find_choice(triptych *t, trip_trial *trial, bool now)
     return now ? make_choice(t, trial, key) : 0;
 }
 
-/* Returns the rays of the best quality: two for each voxel. */
+/* Returns the rays of the best quality: four for each voxel. */
 static int exact_rays(double px)
 {
-    return (int)fmin(fmax(ceil(2 / px), EXACT_RAYS_MIN), EXACT_RAYS_MAX);
+    return (int)fmin(fmax(ceil(EXACT_RAYS_MIN / px), EXACT_RAYS_MIN), EXACT_RAYS_MAX);
 }
 
 static int choose(triptych *t, bool now)

@@ -445,7 +445,7 @@ class Accuracy(program.ProgramTest):
         """An explicit option wins over --quality, wherever it stands."""
         draw = lambda *options: self.picture("a.trip", "--size", "40x32", "--tf", "a.tf", *options)
         one_ray = "--samples", "1", "--lod", "0"
-        exact = "--samples", "2", "--lod", "0", "--early-termination", 1 / 8192
+        exact = "--samples", "4", "--lod", "0", "--early-termination", 1 / 8192
         same = {("--quality", "draft", "--samples-per-sheet", "1", *one_ray):
                 ("--samples-per-sheet", "1", *one_ray),
                 ("--quality", "normal"): (),

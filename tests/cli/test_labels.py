@@ -62,7 +62,8 @@ class Labels(program.ProgramTest):
         program.write_nrrd("large.nrrd", numpy.roll(large, 1, (0, 1, 2)))
         self.works("brick", "large.nrrd", "-o", "large.trip", "--keep-all", "-q", "--levels-for", "both")
         for classify, share in ("post", 0), ("pre", 0.02):
-            picture = self.picture("large.trip", *FLAT, *OBLIQUE, "--lod=20", "--classify", classify)
+            picture = self.picture("large.trip", *FLAT, *OBLIQUE, "--lod=20", "--samples=1",
+                                   "--classify", classify)
             opaque = (picture[..., 3] > 0.99).sum()
             self.assertGreater(opaque, 1000)
             self.assertLessEqual(mixed(picture), share * opaque, classify)

@@ -18,6 +18,7 @@ import instructions
 
 SHADERS = os.path.join(os.environ["TRIP_SOURCE_DIR"], "shaders")
 SIZE = ["--size", "40x40", "--threads", "1"]
+UNTRIED = ["--samples-per-sheet", "2", "--samples", "1", "--lod", "0"]  # makes no trial
 # For each define of the shaders: options that need it, with --classify post and also with pre if it
 # uses another shader. Shading is on by default. "uneven.trip" stands for a data set to draw instead
 # of ball.trip.
@@ -153,7 +154,7 @@ class Uncalled(program.ProgramTest):
         found = []
         for frames in 1, 3:
             self.works("--tool=callgrind", "--callgrind-out-file=cost", program.PROGRAM, "render",
-                       "ball.trip", "-o", "a.tif", *SIZE, "--renderer", "cpu", "--engine", "pread",
+                       "ball.trip", "-o", "a.tif", *SIZE, *UNTRIED, "--renderer", "cpu", "--engine", "pread",
                        "--tf", "line.tf", "--orbit", frames, "--in-flight", 1,
                        program="valgrind")
             found.append(self.costs()[0]["trip_closed_form_find"])
@@ -166,7 +167,7 @@ class Uncalled(program.ProgramTest):
         1 % to the whole run."""
         def cost(effects, *look):
             self.works("--tool=callgrind", "--callgrind-out-file=cost", program.PROGRAM, "render",
-                       "ball.trip", "-o", "a.tif", *SIZE, "--renderer", "cpu", "--engine", "pread",
+                       "ball.trip", "-o", "a.tif", *SIZE, *UNTRIED, "--renderer", "cpu", "--engine", "pread",
                        "--light", "1,1,1", "--effects", effects, *look,
                        program="valgrind", env=dict(os.environ, TRIPTYCH_ISA="plain"))
             costs, total = self.costs()

@@ -198,7 +198,7 @@ class Views(program.ProgramTest):
             (["--tile=128", "--slab-sheets=64"], ["--threads=1"]),
             (["--tile=32"], ["--memory=48M", "--engine=pread"]),
             ([], ["--engine=null"]),
-            ([], ["--renderer=reference"]),
+            ([], ["--renderer=reference", "--samples=1", "--lod=0"]),
         ):
             self.volume(volume, "--keep-all", *brick)
             cameras.add(str(self.camera("--tf=f.tf", "--view=iso", *render)))

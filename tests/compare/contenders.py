@@ -38,6 +38,9 @@ def _numbers(values):
 class Triptych:
     """Runs `triptych bench renderers`, which draws each frame from the data set in memory."""
 
+    # `bench renderers` draws one ray per pixel at the finest level, and has no options for others.
+    ONE_RAY = "--samples", "1", "--lod", "0"
+
     def __init__(self, prepared, renderer, threads, name=None, look=()):
         self.prepared, self.renderer, self.threads = prepared, renderer, threads
         self.name = name or "triptych-" + renderer
@@ -62,7 +65,7 @@ class Triptych:
               self.renderer, "--threads", str(self.threads), "--size", "%dx%d" % (size, size),
               "--eye=" + _numbers(view["eye"]), "--look=" + _numbers(view["look"]),
               "--up=" + _numbers(view["up"]), "--fov", repr(view["fov_degrees"]), "--background",
-              "none"] + self.look)
+              "none", *self.ONE_RAY] + self.look)
 
     def close(self):
         pass
@@ -71,6 +74,7 @@ class Triptych:
 class Quality(Triptych):
     """Runs `triptych render --quality NAME` along a path with a key for each view. The first view is
     drawn twice, and its first frame does not count."""
+    ONE_RAY = ()
 
     def __init__(self, prepared, quality, threads):
         super().__init__(prepared, "cpu", threads, "triptych-" + quality,
@@ -183,8 +187,7 @@ NAMES = ["triptych-cpu", *["triptych-" + quality for quality in QUALITIES], POST
 def make(name, prepared, threads):
     if name.startswith(POST):
         return Triptych(prepared, "cpu", threads, name,
-                        ["--classify", "post", "--samples", "1", "--lod", "0", "--samples-per-sheet",
-                         name[len(POST):]])
+                        ["--classify", "post", "--samples-per-sheet", name[len(POST):]])
     if name[len("triptych-"):] in QUALITIES:
         return Quality(prepared, name[len("triptych-"):], threads)
     if name == "vtk-cpu-half":

@@ -28,6 +28,7 @@ from exr import read_exr  # noqa: E402
 PROMISES = {"draft": 4, "normal": 1, "high": 0.3}  # mean error, of 255
 QUALITIES = {name: ["--quality", name] for name in ("draft", "normal", "high", "exact")}
 FINEST = ["--lod", "0"]
+MANY_RAYS = 16  # along each side of a pixel, for functions with edges
 VTK_PX = 2048  # greatest edge of VTK's pictures
 
 Volume = namedtuple("Volume", "name file voxels_per_px")
@@ -157,9 +158,9 @@ class Data:
             with open(stats, encoding="utf-8") as file:
                 return drawn, json.load(file)
 
-    def truth(self, size):
-        """Returns the mean over each pixel's area. The work folder keeps it."""
-        rays = accuracy.rays_of_area(self.info, self.view(), size)
+    def truth(self, size, rays=0):
+        """Returns the mean over each pixel's area, by N x N rays. The work folder keeps it."""
+        rays = rays or accuracy.rays_of_area(self.info, self.view(), size)
         flat = "-flat" if self.look else ""
         path = os.path.join(self.options.work, "%s-%d-%d%s.npy" % (self.name, size, rays, flat))
         if not os.path.exists(path):
@@ -254,7 +255,7 @@ def by_functions(options):
                 file.write(function_text(kind, values["value_min"], values["value_max"]))
             data = Data(options, path, "%s-%s" % (volume.name, kind), function)
             for size in options.sizes:
-                truth = data.truth(size)
+                truth = data.truth(size, MANY_RAYS)
                 errors = {name: error_of(data.draw(size, setting)[0], truth)
                           for name, setting in QUALITIES.items()}
                 result.append({"volume": volume.name, "function": kind, "size": size,
@@ -269,7 +270,9 @@ def by_functions(options):
         print("%s promises %g: kept in %d of %d cases, greatest mean error %s." %
               (name, most, sum(e <= most for e in errors), len(errors),
                number(max(errors, default=None))))
-    print(notes("truth", "error", "view"))
+    print("The truth is the mean of %d x %d rays of the integral renderer (tolerance %g).\n" %
+          (MANY_RAYS, MANY_RAYS, accuracy.TOLERANCE))
+    print(notes("error", "view"))
     return result
 
 

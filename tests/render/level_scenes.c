@@ -86,6 +86,24 @@ void level_scene_waves(level_scene *l, const level_contents *waves)
     level_scene_use_colours(l);
 }
 
+static bool block_voxel(void *user, int i, int j, int k, unsigned *code, double gradient[3])
+{
+    (void)user, (void)gradient;
+    *code = (i / 3 + j / 4 + k / 5) % 2 ? 65535 : 0;
+    return true;
+}
+
+void level_scene_blocks(level_scene *l)
+{
+    level_contents blocks = level_waves;
+    blocks.voxel = block_voxel;
+    level_scene_create(l, &blocks);
+    scene_colour(&l->of, 0, 1500, 1, 0.3, 0.2, 0.05);
+    scene_colour(&l->of, 62000, 65534, 0.2, 0.5, 1, 0.3);
+    scene_colour(&l->of, 65535, 65535, 1, 1, 0.2, 0.9);
+    level_scene_use_colours(l);
+}
+
 trip_camera_params level_scene_view(const level_scene *l, int number, int pixels)
 {
     const trip_vec3 from[] = { { 1, 0.8, 0.6 }, { -0.2, 1, 0.1 }, { 0.5, -0.4, -1 } };

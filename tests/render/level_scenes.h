@@ -33,6 +33,9 @@ trip_settings level_scene_settings(void);
 extern const level_contents level_waves;
 /* Creates a scene of waves, with colours. */
 void level_scene_waves(level_scene *l, const level_contents *waves);
+/* Creates a scene of blocks with codes 0 and 65535. Cubic kernels overshoot both ends of the table,
+ * beyond which the function is constant. */
+void level_scene_blocks(level_scene *l);
 /* Returns one of three views of waves. View 1 is from inside, view 2 is parallel. */
 trip_camera_params level_scene_view(const level_scene *l, int number, int pixels);
 

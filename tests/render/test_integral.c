@@ -242,6 +242,36 @@ static void cubic_goes_through_a_parabola_and_linear_through_its_chords(void **s
     scene_destroy(&s);
 }
 
+/* The codes along z are 0, 60000, 60000 and 0. */
+static bool peak(void *user, int i, int j, int k, unsigned *code, double gradient[3])
+{
+    (void)user, (void)i, (void)j, (void)gradient;
+    *code = k == 1 || k == 2 ? 60000 : 0;
+    return true;
+}
+
+/* Only code 65535 is visible. The code is 60000 (1 + (t - t^2) / 2) in the middle cell, and at most
+ * 60000 elsewhere. The function is constant beyond the table. */
+static void a_cubic_cell_that_overshoots_the_table_counts_with_its_end(void **state)
+{
+    (void)state;
+    scene s;
+    scene_create(&s, &(scene_params){ .dims = { 8, 8, 4 }, .voxel = peak });
+    trip_settings settings = exact(1e-6);
+    settings.kernel = TRIP_KERNEL_CUBIC;
+    trip_camera_params view = scene_view(&s, trip_v3(0, 0, 1), 60, 20, 1);
+    view.ortho_height = 0.01;
+    for (int i = 0; i < 3; i++) {
+        const float opaque[] = { 0.5F, 2, 20 };
+        s.table[65535] = (trip_tf_entry){ 1, 1, 1, opaque[i] };
+        const double beyond = sqrt(1 - 8 * (65534.5 / 60000 - 1));
+        scene_picture p = integrate(&s, &view, &settings);
+        assert_close(p.rgba[3], 1 - exp(-(double)opaque[i] * beyond), 1e-5);
+        scene_picture_free(&p);
+    }
+    scene_destroy(&s);
+}
+
 /* Gradients are differences of values, so that it does not matter whether normals are stored for
  * splats. */
 static void values_are_lit_without_stored_normals(void **state)
@@ -796,6 +826,7 @@ int main(void)
         cmocka_unit_test(a_cell_without_a_corner_is_empty),
         cmocka_unit_test(values_are_lit_without_stored_normals),
         cmocka_unit_test(cubic_goes_through_a_parabola_and_linear_through_its_chords),
+        cmocka_unit_test(a_cubic_cell_that_overshoots_the_table_counts_with_its_end),
         cmocka_unit_test(a_ball_shines_where_lit_and_visible),
         cmocka_unit_test(the_colours_of_a_lit_ball_converge_with_resolution),
         cmocka_unit_test(a_splat_is_a_gaussian_cut_off_and_lowered),

@@ -828,6 +828,46 @@ static double value_at(const layers *l, trip_kernel kernel, double z)
     return sum / weights;
 }
 
+/* The codes along z are 0, 60000, 60000 and 0, or 65535 minus these. */
+static bool peak_voxel(void *user, int i, int j, int k, unsigned *code, double gradient[3])
+{
+    const bool *low = user;
+    (void)i, (void)j, (void)gradient;
+    const unsigned high = k == 1 || k == 2 ? 60000 : 0;
+    *code = *low ? 65535 - high : high;
+    return true;
+}
+
+/* The cubic kernel has 60000 (1 + (t - t^2) / 2) between the two voxels of 60000, and 67500 in the
+ * middle. With two samples per sheet, codes are linear from 60000 to 67500. The function is
+ * constant beyond 65535. It is a step at the end of the table, or a ramp over the table. */
+static void the_end_of_the_function_counts_beyond_the_table(void **state)
+{
+    (void)state;
+    for (int i = 0; i < 4; i++) {
+        bool low = i % 2;
+        const bool ramp = i / 2;
+        scene s;
+        scene_create(&s, &(scene_params){ .dims = { 8, 8, 4 }, .voxel = peak_voxel, .user = &low });
+        for (int n = 0; n < 65536; n++) {
+            const float k = ramp ? (float)n / 65535 : n == 65535;
+            s.table[low ? 65535 - n : n] = (trip_tf_entry){ 1, 1, 1, k };
+        }
+        const double step = (67500 - 65534.5) / 7500;
+        const double mean = ((60000 + 65535) * 0.5 * 5535 + 65535.0 * 1965) / 7500 / 65535;
+        const double depth = ramp ? mean + 2 * 30000 / 65535.0 : step;
+        trip_camera_params view = view_along(&s, trip_v3(0, 0, 1), 20, 3);
+        view.ortho_height = 2;
+        trip_settings settings = scene_post(2);
+        settings.kernel = TRIP_KERNEL_CUBIC;
+        scene_turn turn = scene_turns(scene_renderers_post(), &s, &view, &settings);
+        while (scene_take_turn(&turn))
+            assert_close(scene_pixel(&turn.picture, 1, 1)[3], 1 - exp(-depth),
+                         2e-4 + turn.renderer->tolerance);
+        scene_destroy(&s);
+    }
+}
+
 /* Rays follow the axis. Extinction is linear in the code, so that the optical depth is the sum of
  * the trapezoids between samples. */
 static void samples_between_sheets_have_the_values_of_the_kernel(void **state)
@@ -1169,6 +1209,7 @@ int main(void)
         cmocka_unit_test(the_error_falls_with_the_square_of_the_samples_per_sheet),
         cmocka_unit_test(values_at_the_sides_converge_to_the_integral),
         cmocka_unit_test(the_cubic_kernel_gives_the_cubic_integral),
+        cmocka_unit_test(the_end_of_the_function_counts_beyond_the_table),
         cmocka_unit_test(samples_between_sheets_have_the_values_of_the_kernel),
         cmocka_unit_test(voxels_beyond_the_halo_repeat_their_neighbours),
         cmocka_unit_test(renderers_leave_out_the_same_voxels_beyond_the_halo),

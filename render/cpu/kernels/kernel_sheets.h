@@ -162,6 +162,7 @@ typedef struct trip_cpu_integrals {
     float extinction;    /* extinction per voxel_world for one unit of sums[0] */
     int32_t first, last; /* range of the entries with extinction; empty if first > last */
     bool is_closed;      /* `closed` replaces all fields above */
+    int32_t end;         /* biased code at which the transfer function ends; constant behind it */
     trip_cpu_closed_form closed;
 } trip_cpu_integrals;
 

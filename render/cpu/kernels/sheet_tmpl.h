@@ -871,6 +871,15 @@ INLINE vi index_of(const trip_cpu_integrals *in, vi code)
     return ((code + (1 << (log2 - 1))) >> log2) + (TRIP_CPU_CODE_BIAS >> in->entry_log2);
 }
 
+/* Moves a sample.index beyond the ends of the transfer function to the nearer end. */
+INLINE vi within_ends(const trip_cpu_integrals *in, vi index)
+{
+    const vi zero = { 0 };
+    const vi low = index_of(in, zero - TRIP_CPU_CODE_BIAS * (1 << WEIGHT_LOG2));
+    const vi high = index_of(in, zero + in->end * (1 << WEIGHT_LOG2));
+    return vi_lesser(vi_greater(index, low), high);
+}
+
 #include "cpu/kernels/corners_tmpl.h"
 
 INLINE void sample_at(const trip_cpu_group *g, const trip_cpu_integrals *in, const pane_path *path,
@@ -1055,6 +1064,58 @@ INLINE medium classified_closed(const trip_cpu_closed_form *f, vm open, const sa
         const vf whole = v_select(v_gt(v_abs(to - from), none), to - from, v_set(1));
         s.extinction = v_select(cut, s.extinction * d / whole, s.extinction);
     }
+    return s;
+}
+
+INLINE medium classified_within(const trip_cpu_sheet_view *view, vm open, const sample *a,
+                                const sample *b, sample *first, sample *last)
+{
+    return BLURRED           ? classified_blurred(view->blurred, open, a, b, first, last)
+           : TRIP_CPU_CLOSED ? classified_closed(&view->integrals->closed, open, first, last)
+                             : classified(view->integrals, first, last);
+}
+
+/* Adds a part of the segment, with a medium of its own. */
+INLINE void add_medium(const medium *part, vf share, medium *sum)
+{
+    const vf none = v_set(0), k = share * part->extinction;
+    for (int i = 0; i < 3; i++)
+        sum->rgb[i] = v_fma(k, v_select(v_gt(k, none), part->rgb[i], none), sum->rgb[i]);
+    sum->extinction = sum->extinction + k;
+}
+
+/* Classifies a segment with codes that may lie beyond the ends of the transfer function, where it
+ * is constant. Kernels of 64 voxels overshoot the codes of voxels. The result for a ray does not
+ * depend on the rays beside it. */
+static medium classified_beyond(const trip_cpu_sheet_view *view, vm open, const sample *a,
+                                const sample *b, sample *first, sample *last)
+{
+    const vi zero = { 0 }, lesser = vi_lesser(first->index, last->index);
+    const vi greater = vi_greater(first->index, last->index);
+    const vi from = within_ends(view->integrals, lesser);
+    const vi to = within_ends(view->integrals, greater);
+    const vf none = v_set(0), one = v_set(1), all = v_from_int(greater - lesser);
+    const vm beyond = v_gt(v_abs(v_from_int((from - lesser) | (greater - to))), none);
+    if (!vm_any(beyond))
+        return classified_within(view, open, a, b, first, last);
+    sample ends[4] = { { .index = within_ends(view->integrals, first->index) },
+                       { .index = within_ends(view->integrals, last->index) },
+                       { .index = from },
+                       { .index = to } };
+    const vf unit = one / v_select(v_gt(all, none), all, one);
+    const vi below = vi_greater(vi_lesser(greater, from) - lesser, zero);
+    const vi above = vi_greater(greater - vi_greater(lesser, to), zero);
+    medium s = classified_within(view, open, a, b, &ends[0], &ends[1]);
+    const medium low = classified_within(view, open, a, b, &ends[2], &ends[2]);
+    const medium high = classified_within(view, open, a, b, &ends[3], &ends[3]);
+    medium sum = { .extinction = none, .rgb = { none, none, none } };
+    add_medium(&s, v_from_int(to - from) * unit, &sum);
+    add_medium(&low, v_from_int(below) * unit, &sum);
+    add_medium(&high, v_from_int(above) * unit, &sum);
+    const vm parts = vm_and(beyond, v_gt(all, none));
+    for (int i = 0; i < 3; i++)
+        s.rgb[i] = v_select(parts, sum.rgb[i] / v_max(sum.extinction, v_set(1e-30f)), s.rgb[i]);
+    s.extinction = v_select(parts, sum.extinction, s.extinction);
     return s;
 }
 
@@ -1273,8 +1334,11 @@ INLINE bool composite_segment(const trip_cpu_sheet_view *view, const trip_cpu_gr
                               vf pixel[CHANNELS])
 {
     vm open = vm_and(vm_and(a->there, b->there), v_gt(pixel[3], v_set(0)));
-    open = vm_and(open, TRIP_CPU_CLOSED || NEAREST || BLURRED
-                            ? l->along
+    open = vm_and(open, TRIP_CPU_CLOSED || NEAREST || BLURRED ? l->along
+                        : is_wide(g)
+                            ? vm_and(l->along, may_show(view->integrals,
+                                                        within_ends(view->integrals, a->index),
+                                                        within_ends(view->integrals, b->index)))
                             : vm_and(l->along, may_show(view->integrals, a->index, b->index)));
     if (view->ortho) /* leaves out segments that begin behind the eye's plane */
         open = vm_and(open, v_ge(ray_depth(l, v_set(path->along[n])), v_set(0)));
@@ -1310,10 +1374,9 @@ INLINE bool composite_segment(const trip_cpu_sheet_view *view, const trip_cpu_gr
     }
     if (!vm_any(open))
         return false;
-    medium s = NEAREST           ? classified_nearest(view, open, first)
-               : BLURRED         ? classified_blurred(view->blurred, open, a, b, first, last)
-               : TRIP_CPU_CLOSED ? classified_closed(&view->integrals->closed, open, first, last)
-                                 : classified(view->integrals, first, last);
+    medium s = NEAREST      ? classified_nearest(view, open, first)
+               : is_wide(g) ? classified_beyond(view, open, a, b, first, last)
+                            : classified_within(view, open, a, b, first, last);
     for (int k = 0; k < 3 && view->has_debug_colour; k++)
         s.rgb[k] = v_set(view->debug_colour[k]);
     open = vm_and(open, v_gt(s.extinction, v_set(0)));

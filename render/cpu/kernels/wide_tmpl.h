@@ -120,6 +120,12 @@ INLINE void find_wide_positions(const trip_cpu_group *g, const pane_path *path, 
     }
 }
 
+/* The cubic kernel overshoots the codes of its voxels by at most 0.4765625 of their range
+ * (trip_field_code_bounds()). The maximum times 2^WEIGHT_LOG2, doubled, fits 32 bits. */
+#define OVERSHOT_MAX 64000
+static_assert(OVERSHOT_MAX >= TRIP_CPU_CODE_BIAS + 65535 * 0.4765625, "no code is cut");
+static_assert(OVERSHOT_MAX <= INT32_MAX / 2 >> WEIGHT_LOG2, "differences of codes");
+
 /* Does the work of sample_at() at one end of a segment. */
 static void wide_sample_at(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
                            const pane_path *path, const stamp_rays *l, unsigned n, unsigned segment,
@@ -131,8 +137,8 @@ static void wide_sample_at(const trip_cpu_sheet_view *view, const trip_cpu_group
         tap taps[64];
         lack[i] = !take_taps(view, g, s->wide, i, taps);
         if (!lack[i])
-            code[i] = (int32_t)(within(interpolated_code(view, s->wide, i, taps), TRIP_CPU_CODE_MIN,
-                                       INT16_MAX) *
+            code[i] = (int32_t)(within(interpolated_code(view, s->wide, i, taps), -OVERSHOT_MAX,
+                                       OVERSHOT_MAX) *
                                 (1 << WEIGHT_LOG2));
         if (!lack[i] && BLURRED)
             deviation[i] = interpolated_deviation(view, g, s->wide, i, taps);

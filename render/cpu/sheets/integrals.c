@@ -172,13 +172,15 @@ static void set_next_visible(trip_cpu_tf *f, const trip_tf_entry *table)
     f->last_visible = (int16_t)((int)last - TRIP_CPU_CODE_BIAS);
 }
 
-/* Returns the integral of extinction over all codes. */
-static double whole_integral(const trip_tf_entry *table, trip_cpu_codes codes)
+/* Returns the integral of extinction over all codes, and the maximum. */
+static double whole_integral(const trip_tf_entry *table, trip_cpu_codes codes, double *max)
 {
     double all = 0, before = entry_at(table, codes, 0).extinction;
+    *max = before;
     for (int code = 1; code < CODES; code++) {
         const double here = entry_at(table, codes, code).extinction;
         all += 0.5 * (before + here);
+        *max = fmax(*max, here);
         before = here;
     }
     return all;
@@ -227,7 +229,7 @@ static void set_entry(trip_cpu_integrals *in, int entry, const double sum[4],
     double at[4];
     step(here, here, at);
     for (int i = 0; i < 4; i++) {
-        in->sums[entry][i] = rounded(factor * sum[i]);
+        in->sums[entry][i] = rounded(fmin(INT32_MAX - 1, factor * sum[i]));
         in->at[entry][i] = rounded(fmin(INT32_MAX - 1, codes * factor * at[i]));
     }
 }
@@ -254,11 +256,14 @@ static void set_sums(trip_cpu_integrals *in, const trip_tf_entry *table, trip_cp
 
 static void set_integrals(trip_cpu_tf *f, const trip_tf_entry *table)
 {
-    const double all = whole_integral(table, f->codes);
+    double max;
+    const double all = whole_integral(table, f->codes, &max);
     /* If the integral is 0, at[] still needs a unit. */
     const double factor = all > 0 ? GREATEST / all : 1;
     f->integrals.entry_log2 = LOG2_MAX;
-    while (!suffices(table, f->codes, f->integrals.entry_log2, f->voxel_world))
+    while (!suffices(table, f->codes, f->integrals.entry_log2, f->voxel_world) ||
+           (f->integrals.entry_log2 > 0 &&
+            ldexp(factor * max, f->integrals.entry_log2) > INT32_MAX)) /* `at` needs 32 bits */
         f->integrals.entry_log2--;
     set_sums(&f->integrals, table, f->codes, factor);
     f->integrals.extinction = (float)fmin(
@@ -413,6 +418,8 @@ static bool set(trip_cpu_tf *f, const trip_tf_entry *table, XXH128_hash_t hash,
     f->voxel_world = voxel_world;
     f->integrals.is_closed = closed != NULL;
     f->integrals.entry_log2 = 0;
+    f->integrals.end = (int32_t)fmin(INT16_MAX, ldexp(CODES - 1 - codes.first, (int)codes.shift) -
+                                                    TRIP_CPU_CODE_BIAS);
     if (!closed)
         set_integrals(f, table);
     set_next_visible(f, table);
