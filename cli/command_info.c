@@ -580,13 +580,12 @@ int trip_command_info(int argc, char **argv)
     data_set d = { 0 };
     int status = command_line_parse(&c, argc, argv);
     d.path = o.path;
-    const bool own = status == 0 && !o.verify && own_file_wanted(o.path);
-    if (status == 0 && !own)
+    if (status == 0)
         status = library_create(&d.t, NULL);
-    if (own)
-        status = own_file_info(o.path, o.json != 0);
-    else if (status == 0 && gaussian_info_wanted(d.t, o.path))
+    if (status == 0 && gaussian_info_wanted(d.t, o.path))
         status = gaussian_info_print(d.t, o.path, p.sets[VOLUME].given, o.json != 0);
+    else if (status == 0 && !o.verify && own_file_wanted(o.path))
+        status = own_file_info(o.path, o.json != 0);
     else if (status == 0)
         status = cached_volume_wanted(o.path)
                      ? volume_info_print(d.t, o.path, &o.volume, o.json != 0)

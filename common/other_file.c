@@ -421,7 +421,7 @@ static bool is_script(const file *f)
         memcpy(word + 1, line, n);
         word[n + 1] = ' ';
         const bool blank = length == 0 || line[0] == '#' || line[0] == '\r';
-        const bool whole = end || f->bytes < TRIP_OTHER_HEAD_BYTES;
+        const bool whole = end || f->bytes < TRIP_OTHER_HEAD_BYTES || length > sizeof word;
         if (!blank && whole &&
             (n == 0 || (n < length && !is_blank(line[n]) && line[n] != '\r') ||
              !strstr(words, word)))
@@ -482,7 +482,7 @@ static trip_other_kind tell_own_text(const file *f)
             "it");
         return TRIP_OTHER_FUNCTION;
     }
-    if (begins(f, "{") && holds(f, "\"means\"") && holds(f, "\"sh0\"") && holds(f, ".webp")) {
+    if (begins(f, "{") && holds(f, "\"means\"") && holds(f, ".webp\"")) {
         SAY("is a scene of Gaussian splats (SOG), not a volume" DESCRIBED);
         return TRIP_OTHER_FOREIGN;
     }

@@ -1,6 +1,7 @@
 /* Reads Gaussian scenes in SOG (PlayCanvas): meta.json and pictures in WebP, in a ZIP archive or in
- * a folder. A pixel of each picture belongs to one Gaussian. WebP is read as a whole, so the
- * pictures stay in memory. They take 20 bytes for each Gaussian, and 4 more with harmonics. */
+ * a folder. A pixel of each picture belongs to one Gaussian. The decoder of WebP
+ * needs a whole picture. All pictures are kept in memory. They take 20 bytes for each Gaussian, and
+ * 4 more with harmonics. */
 #include "gaussian_file_internal.h"
 
 #include <cjson/cJSON.h>
@@ -54,8 +55,7 @@ typedef struct sog {
 static bool is_folder_meta(const trip_gaussian_head *head)
 {
     return head->bytes[0] == '{' && memmem(head->bytes, head->count, "\"means\"", 7) &&
-           memmem(head->bytes, head->count, "\"sh0\"", 5) &&
-           memmem(head->bytes, head->count, ".webp", 5);
+           memmem(head->bytes, head->count, ".webp\"", 6);
 }
 
 static bool probe(const trip_gaussian_head *head)
@@ -170,12 +170,18 @@ static int numbers(const trip_gaussian_file *f, const char *group, const char *n
     return 0;
 }
 
+/* Pictures are padded to rectangles. The labels of a palette have 16 bits. */
 static int decode_picture(const trip_gaussian_file *f, const sog *s, const char *name,
-                          const part *p, picture *out)
+                          const part *p, bool palette, picture *out)
 {
+    const uint64_t most = palette ? 65536 * 15 : 4 * f->info.count + 65536;
     if (!WebPGetInfo(p->bytes, p->count, &out->width, &out->height))
         return FAULT("its part %s is no WebP picture", name);
     out->bytes = 4 * (size_t)out->width * (size_t)out->height;
+    if (out->bytes / 4 > most)
+        return FAULT("its picture %s has %d x %d pixels, which are too many for %" PRIu64
+                     " Gaussians",
+                     name, out->width, out->height, f->info.count);
     /* The decoder takes as much again. */
     const bool fits = trip_budget_charge(s->budget, out->bytes);
     out->pixels = fits ? trip_budget_take(s->budget, out->bytes) : NULL;
@@ -200,7 +206,7 @@ static int load_picture(trip_gaussian_file *f, const char *group, int index, pic
         return FAULT("meta.json lacks the name of a file in %s.files", group);
     int status = load(f, s, name, &p);
     if (status == 0)
-        status = decode_picture(f, s, name, &p, &s->pictures[which]);
+        status = decode_picture(f, s, name, &p, which == PALETTE, &s->pictures[which]);
     release(s, &p);
     const picture *made = &s->pictures[which];
     if (status == 0 && which != PALETTE &&

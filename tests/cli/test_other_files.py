@@ -113,6 +113,7 @@ FILES = [
     ("a.jpg", b"\xff\xd8\xff\xe0" + bytes(40), "JPEG", "convert"),
     ("a.csv", b"x,y,z\n1,2,3\n4,5,6\n7,8,9\n", "table of numbers", "NRRD"),
     ("a.txt", b"hello\n" * 9, "is text", "not a volume"),
+    ("b.txt", b"{" + b"hello " * 900, "is text", "not a volume"),
     ("program", b"\x7fELF" + bytes(60), "a program", "not a volume"),
 ]
 
@@ -127,7 +128,7 @@ SCENES = [
     ("b.spz", b"NGSP\4\0\0\0" + bytes(60), "Gaussian splats (SPZ)"),
     ("a.splat", struct.pack("<6f8B", *[1.5] * 6, *range(8)), "Gaussian splats (.splat)"),
     ("a.sog", archive(zipfile.ZipFile, "w"), "Gaussian splats (SOG)"),
-    ("meta.json", b'{"means": {"files": ["a.webp"]}, "sh0": 1}', "Gaussian splats (SOG)"),
+    ("meta.json", b'{"means": {"files": ["a.webp"]}, "scales": [' + b"1, " * 2000, "Gaussian splats (SOG)"),
     ("a.glb", b'glTF\2\0\0\0' + bytes(12) + b'{"extensionsUsed": ["KHR_gaussian_splatting"]}',
      "Gaussian splats (glTF)"),
     ("a.gltf", b'{"extensionsUsed": ["KHR_gaussian_splatting"]}', "Gaussian splats (glTF)"),

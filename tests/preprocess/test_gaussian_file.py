@@ -716,6 +716,8 @@ class GaussianFile(unittest.TestCase):
         self.refuses("d.sog", archive({**parts, "quats.webp": b"RIFF"}), "no WebP picture")
         self.refuses("e.sog", archive({**parts, "quats.webp": parts["quats.webp"][:-200]}), "is damaged")
         self.refuses("f.sog", archive({**parts, "quats.webp": webp(np.zeros((9, 4), "u1"))}), "too few")
+        wide = picture(np.zeros((900, 900, 4), "u1"))
+        self.refuses("f.sog", archive({**parts, "quats.webp": wide}), "900 x 900 pixels, which are too many")
         self.refuses("g.sog", archive({**parts, "meta.json": b"{"}), "not JSON")
         self.refuses("h.sog", archive({**parts, "meta.json": b"[" * 1000}), "nested")
         self.refuses("i.sog", changed(count=1e12), "count")
