@@ -11,7 +11,9 @@
 
 enum {
     READ_AHEAD = 16, /* bricks that the system is asked to read before their turn */
-    NO_SLOT = -1,
+    CHUNK_KEYS = 15,
+    NONE = -1,
+    PREFETCH = 12, /* splats to be delivered, ahead of their turn */
 };
 
 /* A footprint reaches so far beyond its ellipsoid: 3.33 times the root of 0.3 square pixels. */
@@ -29,8 +31,19 @@ typedef struct slot {
     double key;
     uint32_t brick; /* index in the steps */
     uint32_t index; /* in the brick */
-    int64_t next;   /* slot in the same list */
 } slot;
+
+/* A free slot. */
+typedef struct free_slot {
+    int64_t next;
+} free_slot;
+
+/* Some of the slots that become final before the same step. A list of chunks holds them all. */
+typedef struct chunk {
+    int64_t next;
+    uint64_t count;
+    trip_key keys[CHUNK_KEYS];
+} chunk;
 
 /* The steps of a stream and the tables for sorting them. */
 typedef struct steps {
@@ -52,8 +65,9 @@ struct trip_gaussian_stream {
     size_t memory_bytes;
     unsigned char *slots;
     size_t slot_bytes;
-    int64_t *firsts;           /* firsts[i]: list of slots that are final before step i is read */
-    int64_t free;              /* list of free slots */
+    int64_t *firsts; /* firsts[i]: list of chunks of slots that are final before step i is read */
+    chunk *chunks;
+    int64_t free, free_chunk;  /* lists */
     trip_key *ready, *scratch; /* the slots to deliver next, by key */
     size_t ready_count, ready_next;
     unsigned char *planes[TRIP_GAUSSIAN_PLANES]; /* the bytes of a brick */
@@ -206,10 +220,17 @@ static uint64_t window_of(const steps *s, const trip_gaussian_list *list)
     return most;
 }
 
+/* Each step may have a chunk that is not full. */
+static uint64_t chunk_count(uint64_t bricks, uint64_t window)
+{
+    return window / CHUNK_KEYS + bricks + 1;
+}
+
 /* Returns the memory beside the steps. */
 static size_t memory_of(const steps *s, uint64_t window, int degree)
 {
-    return window * (slot_size(degree) + 2 * sizeof(trip_key)) + (s->count + 1) * sizeof(int64_t) +
+    return window * (slot_size(degree) + 2 * sizeof(trip_key)) +
+           chunk_count(s->count, window) * sizeof(chunk) + (s->count + 1) * sizeof(int64_t) +
            planes_size(degree);
 }
 
@@ -247,11 +268,26 @@ static slot *slot_at(const trip_gaussian_stream *s, int64_t i)
     return (void *)(s->slots + (size_t)i * s->slot_bytes);
 }
 
-/* Divides the memory. The keys and lists come first, since they need alignment. */
+static void release_slot(trip_gaussian_stream *s, int64_t i)
+{
+    free_slot *f = (void *)slot_at(s, i);
+    f->next = s->free;
+    s->free = i;
+}
+
+static void release_chunk(trip_gaussian_stream *s, int64_t i)
+{
+    s->chunks[i].next = s->free_chunk;
+    s->free_chunk = i;
+}
+
+/* Divides the memory. */
 static void set_memory(trip_gaussian_stream *s)
 {
     const uint64_t window = s->plan.window_records;
-    s->ready = (void *)s->memory;
+    const uint64_t chunks = chunk_count(s->steps.count, window);
+    s->chunks = (void *)s->memory;
+    s->ready = (void *)(s->chunks + chunks);
     s->scratch = s->ready + window;
     s->firsts = (void *)(s->scratch + window);
     s->slots = (void *)(s->firsts + s->steps.count + 1);
@@ -260,12 +296,12 @@ static void set_memory(trip_gaussian_stream *s)
         s->planes[n] = s->planes[n - 1] +
                        (size_t)TRIP_GAUSSIAN_BRICK_RECORDS_MAX * trip_gaussian_plane_bytes(n - 1);
     for (uint64_t i = 0; i <= s->steps.count; i++)
-        s->firsts[i] = NO_SLOT;
-    s->free = NO_SLOT;
-    for (uint64_t i = window; i > 0; i--) {
-        slot_at(s, (int64_t)i - 1)->next = s->free;
-        s->free = (int64_t)i - 1;
-    }
+        s->firsts[i] = NONE;
+    s->free = s->free_chunk = NONE;
+    for (uint64_t i = window; i > 0; i--)
+        release_slot(s, (int64_t)i - 1);
+    for (uint64_t i = chunks; i > 0; i--)
+        release_chunk(s, (int64_t)i - 1);
 }
 
 /* Asks the system to read a brick soon. */
@@ -353,20 +389,36 @@ static uint64_t final_before(const trip_gaussian_stream *s, uint64_t i, double k
     return lo;
 }
 
+/* Adds a slot to the list of a step. */
+static void add_key(trip_gaussian_stream *s, int64_t *first, trip_key key)
+{
+    if (*first == NONE || s->chunks[*first].count == CHUNK_KEYS) {
+        const int64_t fresh = s->free_chunk;
+        s->free_chunk = s->chunks[fresh].next;
+        s->chunks[fresh].next = *first;
+        s->chunks[fresh].count = 0;
+        *first = fresh;
+    }
+    chunk *c = &s->chunks[*first];
+    c->keys[c->count++] = key;
+}
+
 static void put(trip_gaussian_stream *s, uint64_t i, uint32_t index, double key)
 {
     const int64_t at = s->free;
     slot *to = slot_at(s, at);
     unsigned char *bytes = (unsigned char *)(to + 1);
-    int64_t *first = &s->firsts[final_before(s, i, key)];
-    s->free = to->next;
-    *to = (slot){ .key = key, .brick = (uint32_t)i, .index = index, .next = *first };
-    *first = at;
-    for (int n = 0; n <= s->degree; n++) {
+    s->free = ((const free_slot *)(const void *)to)->next;
+    *to = (slot){ .key = key, .brick = (uint32_t)i, .index = index };
+    memcpy(bytes, s->planes[0] + (size_t)index * TRIP_GAUSSIAN_RECORD_BYTES,
+           TRIP_GAUSSIAN_RECORD_BYTES);
+    bytes += TRIP_GAUSSIAN_RECORD_BYTES;
+    for (int n = 1; n <= s->degree; n++) {
         const size_t record = trip_gaussian_plane_bytes((unsigned)n);
         memcpy(bytes, s->planes[n] + index * record, record);
         bytes += record;
     }
+    add_key(s, &s->firsts[final_before(s, i, key)], (trip_key){ trip_key_of(key), (uint64_t)at });
 }
 
 static int read_step(trip_gaussian_stream *s, uint64_t i)
@@ -412,8 +464,13 @@ static void sort_equal(trip_gaussian_stream *s)
 static void collect(trip_gaussian_stream *s, uint64_t i)
 {
     s->ready_count = s->ready_next = 0;
-    for (int64_t at = s->firsts[i]; at != NO_SLOT; at = slot_at(s, at)->next)
-        s->ready[s->ready_count++] = (trip_key){ trip_key_of(slot_at(s, at)->key), (uint64_t)at };
+    for (int64_t at = s->firsts[i], next; at != NONE; at = next) {
+        const chunk *c = &s->chunks[at];
+        memcpy(s->ready + s->ready_count, c->keys, c->count * sizeof *c->keys);
+        s->ready_count += c->count;
+        next = c->next;
+        release_chunk(s, at);
+    }
     trip_key_sort(s->ready, s->scratch, s->ready_count);
     sort_equal(s);
 }
@@ -441,14 +498,15 @@ static int advance(trip_gaussian_stream *s)
 static void deliver(trip_gaussian_stream *s, trip_gaussian *out, double *key)
 {
     const int64_t at = (int64_t)s->ready[s->ready_next++].number;
-    slot *from = slot_at(s, at);
+    if (s->ready_next + PREFETCH < s->ready_count)
+        __builtin_prefetch(slot_at(s, (int64_t)s->ready[s->ready_next + PREFETCH].number));
+    const slot *from = slot_at(s, at);
     const unsigned char *record = (const unsigned char *)(from + 1);
     trip_gaussian_decode(&s->list->bricks[s->steps.sorted[from->brick].brick], record,
                          record + TRIP_GAUSSIAN_RECORD_BYTES, s->degree, out);
     if (key)
         *key = from->key;
-    from->next = s->free;
-    s->free = at;
+    release_slot(s, at);
 }
 
 int trip_gaussian_stream_next(trip_gaussian_stream *s, trip_gaussian *out, double *keys,
