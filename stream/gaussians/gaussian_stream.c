@@ -33,11 +33,6 @@ typedef struct slot {
     uint32_t index; /* in the brick */
 } slot;
 
-/* A free slot. */
-typedef struct free_slot {
-    int64_t next;
-} free_slot;
-
 /* Some of the slots that become final before the same step. A list of chunks holds them all. */
 typedef struct chunk {
     int64_t next;
@@ -67,7 +62,9 @@ struct trip_gaussian_stream {
     size_t slot_bytes;
     int64_t *firsts; /* firsts[i]: list of chunks of slots that are final before step i is read */
     chunk *chunks;
-    int64_t free, free_chunk;  /* lists */
+    int64_t *free_slots; /* free_count numbers; the last is used first */
+    uint64_t free_count;
+    int64_t free_chunk;        /* list */
     trip_key *ready, *scratch; /* the slots to deliver next, by key */
     size_t ready_count, ready_next;
     unsigned char *planes[TRIP_GAUSSIAN_PLANES]; /* the bytes of a brick */
@@ -229,7 +226,7 @@ static uint64_t chunk_count(uint64_t bricks, uint64_t window)
 /* Returns the memory beside the steps. */
 static size_t memory_of(const steps *s, uint64_t window, int degree)
 {
-    return window * (slot_size(degree) + 2 * sizeof(trip_key)) +
+    return window * (slot_size(degree) + 2 * sizeof(trip_key) + sizeof(int64_t)) +
            chunk_count(s->count, window) * sizeof(chunk) + (s->count + 1) * sizeof(int64_t) +
            planes_size(degree);
 }
@@ -270,9 +267,7 @@ static slot *slot_at(const trip_gaussian_stream *s, int64_t i)
 
 static void release_slot(trip_gaussian_stream *s, int64_t i)
 {
-    free_slot *f = (void *)slot_at(s, i);
-    f->next = s->free;
-    s->free = i;
+    s->free_slots[s->free_count++] = i;
 }
 
 static void release_chunk(trip_gaussian_stream *s, int64_t i)
@@ -290,14 +285,15 @@ static void set_memory(trip_gaussian_stream *s)
     s->ready = (void *)(s->chunks + chunks);
     s->scratch = s->ready + window;
     s->firsts = (void *)(s->scratch + window);
-    s->slots = (void *)(s->firsts + s->steps.count + 1);
+    s->free_slots = s->firsts + s->steps.count + 1;
+    s->slots = (void *)(s->free_slots + window);
     s->planes[0] = s->slots + window * s->slot_bytes;
     for (unsigned n = 1; n <= (unsigned)s->degree; n++)
         s->planes[n] = s->planes[n - 1] +
                        (size_t)TRIP_GAUSSIAN_BRICK_RECORDS_MAX * trip_gaussian_plane_bytes(n - 1);
     for (uint64_t i = 0; i <= s->steps.count; i++)
         s->firsts[i] = NONE;
-    s->free = s->free_chunk = NONE;
+    s->free_chunk = NONE;
     for (uint64_t i = window; i > 0; i--)
         release_slot(s, (int64_t)i - 1);
     for (uint64_t i = chunks; i > 0; i--)
@@ -405,10 +401,9 @@ static void add_key(trip_gaussian_stream *s, int64_t *first, trip_key key)
 
 static void put(trip_gaussian_stream *s, uint64_t i, uint32_t index, double key)
 {
-    const int64_t at = s->free;
+    const int64_t at = s->free_slots[--s->free_count];
     slot *to = slot_at(s, at);
     unsigned char *bytes = (unsigned char *)(to + 1);
-    s->free = ((const free_slot *)(const void *)to)->next;
     *to = (slot){ .key = key, .brick = (uint32_t)i, .index = index };
     memcpy(bytes, s->planes[0] + (size_t)index * TRIP_GAUSSIAN_RECORD_BYTES,
            TRIP_GAUSSIAN_RECORD_BYTES);
