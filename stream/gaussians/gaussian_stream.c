@@ -197,8 +197,9 @@ static size_t planes_size(int degree)
     return bytes;
 }
 
-/* When a brick is read, the window holds only splats of bricks whose greatest key is not below the
- * brick's least key. The bricks leave in the order of their greatest keys. */
+/* Returns the greatest number of splats in the window. A brick may have splats in it until a brick
+ * is read with a least key above its own greatest key. Bricks leave in the order of their greatest
+ * keys. */
 static uint64_t window_of(const steps *s, const trip_gaussian_list *list)
 {
     uint64_t held = 0, most = 0, gone = 0;

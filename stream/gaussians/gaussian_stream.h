@@ -60,7 +60,7 @@ double trip_gaussian_key_of(const trip_gaussian_key *key, const double centre[3]
 /* The size of a stream, from the index alone. */
 typedef struct trip_gaussian_plan {
     uint64_t bricks, records; /* that will be read */
-    uint64_t window_records;  /* the most that the window holds */
+    uint64_t window_records;  /* greatest number of splats in the window */
     uint64_t bytes;           /* of memory that the stream takes from its budget */
     uint64_t read_bytes;      /* from the disk */
 } trip_gaussian_plan;
