@@ -76,7 +76,7 @@ static bool repair(trip_gaussian *g, int degree)
         length += (double)g->rotation[i] * (double)g->rotation[i];
     for (int k = 0; k < trip_sh_count(degree); k++)
         for (int c = 0; c < 3; c++)
-            good = good && isfinite(g->sh[k][c]);
+            good = good && fabsf(g->sh[k][c]) <= TRIP_GAUSSIAN_COEFFICIENT_MAX;
     if (!good || !isfinite(length) || !(length > 0))
         return false;
     for (int i = 0; i < 4; i++)

@@ -1,5 +1,6 @@
 #include "gaussian_sort.h"
 
+#include "folder.h"
 #include "gaussian_code.h"
 #include "report.h"
 

@@ -6,7 +6,6 @@
 
 #include "gaussian.h"
 #include "gaussian_tree.h"
-#include "folder.h"
 #include "output.h"
 
 /* Begins each spilled splat. A trip_gaussian with the coefficients up to the degree follows. */

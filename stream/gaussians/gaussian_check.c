@@ -131,9 +131,11 @@ static const char *fault_of_brick(const trip_file_gaussian_brick *b,
     if (!is_range(b->log_lo, b->log_hi) || b->log_hi > 40)
         return "the range of a brick's deviations is invalid";
     for (int c = 0; c < 3; c++) {
-        if (!is_range(b->colour_lo[c], b->colour_hi[c]))
+        if (!is_range(b->colour_lo[c], b->colour_hi[c]) ||
+            b->colour_lo[c] < -TRIP_GAUSSIAN_COEFFICIENT_MAX ||
+            b->colour_hi[c] > TRIP_GAUSSIAN_COEFFICIENT_MAX)
             return "the range of a brick's colours is invalid";
-        if (!(isfinite(b->scale[c]) && b->scale[c] >= 0) ||
+        if (!(b->scale[c] >= 0 && b->scale[c] <= TRIP_GAUSSIAN_COEFFICIENT_MAX) ||
             (c >= (int)h->degree && b->scale[c] != 0))
             return "the scale of a brick's spherical harmonics is invalid";
     }

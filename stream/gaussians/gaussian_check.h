@@ -6,6 +6,8 @@
 
 /* Coordinates of centres and sizes of splats reach at most so far. */
 #define TRIP_GAUSSIAN_FARTHEST 1e15
+/* The greatest magnitude of a coefficient of spherical harmonics. */
+#define TRIP_GAUSSIAN_COEFFICIENT_MAX 1e30f
 
 /* Checks the first bytes of a file of `file_bytes` bytes. Reports the first fault at `where`. */
 int trip_gaussian_check_header(const trip_file_gaussian_header *h, uint64_t file_bytes,

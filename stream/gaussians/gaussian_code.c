@@ -1,6 +1,5 @@
 #include "gaussian_code.h"
 
-#include <float.h>
 #include <limits.h>
 #include <math.h>
 #include <string.h>
@@ -219,9 +218,10 @@ void trip_gaussian_encode(trip_file_gaussian_brick *b, const unsigned char *cons
 }
 
 /* Returns the value of a code, at most `hi` in spite of rounding. */
-static double value_of(unsigned code, double lo, double hi, unsigned max)
+static inline double value_of(unsigned code, double lo, double hi, unsigned max)
 {
-    return fmin(lo + code * ((hi - lo) / max), hi);
+    const double value = lo + code * ((hi - lo) * (1.0 / max));
+    return value < hi ? value : hi;
 }
 
 void trip_gaussian_decode_centre(const trip_file_gaussian_brick *b, const unsigned char *record,
@@ -237,9 +237,7 @@ static float decode_deviation(const trip_file_gaussian_brick *b, unsigned code)
 {
     if (!code)
         return 0;
-    const double value =
-        exp(value_of(code - 1, (double)b->log_lo, (double)b->log_hi, DEVIATION_MAX - 1));
-    return (float)fmin(value, (double)FLT_MAX);
+    return expf((float)value_of(code - 1, (double)b->log_lo, (double)b->log_hi, DEVIATION_MAX - 1));
 }
 
 /* Numbers that no unit quaternion has are made one. */
@@ -250,14 +248,14 @@ static void decode_rotation(uint64_t word, float rotation[4])
     for (int i = 0, at = 2; i < 4; i++) {
         if (i == largest)
             continue;
-        q[i] = ((double)bits(word, (unsigned)at, 12) * 2 / ROTATION_MAX - 1) * SQRT_HALF;
+        q[i] = ((double)bits(word, (unsigned)at, 12) * (2.0 / ROTATION_MAX) - 1) * SQRT_HALF;
         sum += q[i] * q[i];
         at += 12;
     }
     q[largest] = sum < 1 ? sqrt(1 - sum) : 0;
-    const double length = sqrt(sum + q[largest] * q[largest]);
+    const double scale = sum < 1 ? 1 : 1 / sqrt(sum);
     for (int i = 0; i < 4; i++)
-        rotation[i] = (float)(q[i] / length);
+        rotation[i] = (float)(q[i] * scale);
 }
 
 static float decode_colour(const trip_file_gaussian_brick *b, unsigned code, int c)
