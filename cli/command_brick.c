@@ -478,13 +478,6 @@ static int brick(triptych *t, const options *o)
 
 /* ---- Gaussian scenes ---- */
 
-static int fail_volume_option(const char *name)
-{
-    char option[64];
-    snprintf(option, sizeof option, "--%s", name);
-    return trip_option_fail(option, "does not apply to Gaussian scenes");
-}
-
 /* Refuses options that bricking a scene would ignore. */
 static int check_scene_options(const options *o)
 {
@@ -494,12 +487,9 @@ static int check_scene_options(const options *o)
         for (size_t n = 0; n < sizeof used / sizeof *used; n++)
             is_used |= !strcmp(rows[i].name, used[n]);
         if (!is_used)
-            return fail_volume_option(rows[i].name);
+            return library_fail_scene_option(rows[i].name);
     }
-    for (size_t i = 0; i < volume_options_table.count; i++)
-        if (trip_option_is_set(&volume_options_table.rows[i], &o->brick))
-            return fail_volume_option(volume_options_table.rows[i].name);
-    return 0;
+    return library_check_scene_options(&o->brick);
 }
 
 static int print_scene(const options *o, const triptych_gaussians *g, uint64_t bytes,
@@ -554,9 +544,9 @@ static int run(options *o)
     o->brick.ranges = o->ranges;
     int status = library_create(&t, &progress);
     if (!status)
-        status = triptych_is_gaussians(t, o->volume) ? brick_scene(t, o)
-                 : o->dry_run                        ? dry_run(t, o)
-                                                     : brick(t, o);
+        status = triptych_is_gaussians(t, o->volume) == 1 ? brick_scene(t, o)
+                 : o->dry_run                             ? dry_run(t, o)
+                                                          : brick(t, o);
     trip_progress_end(&progress);
     triptych_destroy(t);
     return status;

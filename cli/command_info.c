@@ -530,6 +530,8 @@ static int show(const options *o, data_set *d, trip_budget *budget)
     int status = triptych_open(d->t, o->path, NULL);
     if (status == TRIP_OK && o->verify)
         status = triptych_verify(d->t);
+    if (status == TRIP_OK && triptych_is_scene(d->t))
+        return gaussian_info_print_scene(d->t, o->path, o->json, o->verify);
     if (status == TRIP_OK)
         status = triptych_get_info(d->t, &d->info);
     if (status == TRIP_OK)

@@ -97,6 +97,8 @@ static int open_data(drawing *d, const char *path)
     resources.keep_pages = d->sequence.frames > 1;
     resources.name = o->input;
     int status = triptych_open(d->t, path, &resources);
+    if (!status && triptych_is_scene(d->t) && o->more_count)
+        return trip_option_fail(o->input, "is a Gaussian scene; give one scene at a time");
     return status ? status : library_add(d->t, o->more, o->more_count, o->heat);
 }
 
@@ -116,7 +118,7 @@ static int open_volume(drawing *d)
         status = quality_options_check_data(d->o.quality.measured, d->t, d->o.input);
     if (!status && d->o.field == RENDER_FIELD_SOURCE)
         status = triptych_set_source(d->t, d->o.input, &d->o.volume);
-    char *note = status == 0 ? library_note(d->t, "note") : NULL;
+    char *note = status == 0 && !triptych_is_scene(d->t) ? library_note(d->t, "note") : NULL;
     if (note)
         trip_note(d->o.input, "%s", note);
     free(note);

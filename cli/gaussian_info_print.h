@@ -13,4 +13,7 @@ bool gaussian_info_wanted(triptych *t, const char *path);
  * negative status after a reported failure. */
 int gaussian_info_print(triptych *t, const char *path, bool options, bool json);
 
+/* Prints the open data set of a Gaussian scene. */
+int gaussian_info_print_scene(triptych *t, const char *path, bool json, bool verified);
+
 #endif

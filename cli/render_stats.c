@@ -245,6 +245,16 @@ static void add_interpolation(cJSON *root, triptych_interpolation drawn)
                                 draw_settings_choice(&s, DRAW_INTERPOLATION));
 }
 
+static void add_scene_method(cJSON *root, const draw_settings *s, const triptych_frame_stats *frame)
+{
+    cJSON_AddStringToObject(root, "order",
+                            s->scene.order == TRIPTYCH_ORDER_LISTS ? "lists" : "depth");
+    cJSON_AddStringToObject(root, "kernel",
+                            frame->footprint
+                                ? footprint_names[frame->footprint - TRIPTYCH_FOOTPRINT_EXACT]
+                                : "projected");
+}
+
 static void add_method(cJSON *root, const render_options *o, const triptych_frame_stats *frame)
 {
     add_interpolation(root, frame->interpolation);
@@ -281,7 +291,10 @@ int render_stats_describe(render_stats *s, const render_options *o, triptych *t)
         return status;
     cJSON_AddStringToObject(root, "renderer", frame.renderer);
     cJSON_AddStringToObject(root, "device", frame.device);
-    add_method(root, o, &frame);
+    if (triptych_is_scene(t))
+        add_scene_method(root, &o->settings, &frame);
+    else
+        add_method(root, o, &frame);
     if (frame.lod_px > 0)
         cJSON_AddNumberToObject(root, "lod_px", frame.lod_px);
     if (frame.rays > 0)

@@ -358,6 +358,8 @@ static int prepare(triptych *t)
     int status = trip_context_check_idle(t, true);
     if (!status)
         status = draw_settings_check(&t->given, &renderer, false);
+    if (!status)
+        status = draw_settings_check_kind(&t->given, false);
     if (status)
         return status;
     if (t->renderer && t->required != renderer)
@@ -475,6 +477,8 @@ int triptych_choose(triptych *t)
 {
     trip_scope *before = trip_context_enter_anew(t);
     const int later = t->resources.choose_later;
+    if (t->scene) /* it has no choices of quality */
+        return trip_context_leave(before, trip_context_check_idle(t, true));
     int status = prepare(t);
     if (!status)
         status = choose_settings(t);

@@ -18,6 +18,7 @@
 #include "library_session.h"
 #include "quality_choice.h"
 #include "sheet_samples.h"
+#include "source.h"
 #include "triptych.h"
 
 enum { TRIP_CONTEXT_MAX_THREADS = 256, TRIP_CONTEXT_NOTES = 8 };
@@ -180,6 +181,8 @@ int trip_context_note_stats(triptych *t);
 void trip_context_drop_stats(triptych *t);
 
 /* Gaussian scenes (library_scene.c): like the functions for volumes, inside the context's scope. */
+/* Finds the files of a volume or of a Gaussian scene. */
+int trip_context_find_files(trip_source *s, const char *path, const trip_volume_params *params);
 int trip_context_open_scene(triptych *t, const char *path, uint64_t memory_bytes);
 void trip_context_close_scene(triptych *t);
 /* Fails with TRIP_USAGE (reported) unless a volume is open. */

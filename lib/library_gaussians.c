@@ -2,6 +2,7 @@
 #include "triptych_brick.h"
 
 #include <cjson/cJSON.h>
+#include <dirent.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -10,8 +11,10 @@
 #include "brick_gaussians.h"
 #include "gaussian_file.h"
 #include "gaussian_format.h"
+#include "gaussian_set.h"
 #include "json.h"
 #include "library_context.h"
+#include "source.h"
 #include "report.h"
 
 enum { BATCH = 1024 };
@@ -62,6 +65,57 @@ static int describe(const char *path, triptych_gaussians *out)
     trip_gaussian_file_close(f);
     if (status == 0 && out->count == 0)
         status = trip_fail(TRIP_ERROR, "read", path, "holds no Gaussian with finite values");
+    return status;
+}
+
+/* ---- files ---- */
+
+static bool ends_in(const char *name, const char *end)
+{
+    const size_t length = strlen(name), tail = strlen(end);
+    return length >= tail && !strcmp(name + length - tail, end);
+}
+
+/* Adds the files of a folder that a scene can be read from, in the order of their names. */
+static int add_parts(trip_source *s, const char *folder, const char *end)
+{
+    struct dirent **names = NULL;
+    int status = 0;
+    const int count = scandir(folder, &names, NULL, alphasort);
+    for (int i = 0; i < count; i++) {
+        char *part = NULL;
+        if (!status && ends_in(names[i]->d_name, end))
+            status = asprintf(&part, "%s/%s", folder, names[i]->d_name) < 0
+                         ? trip_fail(TRIP_ERROR, "read", folder, "out of memory")
+                         : trip_source_add(s, part);
+        free(part);
+        free(names[i]);
+    }
+    free(names);
+    return status;
+}
+
+/* A .gltf file has its numbers in .bin files beside it, and the meta.json of SOG its pictures. */
+static int add_files(trip_source *s, const char *path)
+{
+    const char *slash = strrchr(path, '/');
+    char *folder = slash ? strndup(path, (size_t)(slash - path) + 1) : strdup(".");
+    int status = folder ? trip_source_add(s, path)
+                        : trip_fail(TRIP_ERROR, "read", path, "out of memory");
+    if (!status && (ends_in(path, ".gltf") || ends_in(path, ".json")))
+        status = add_parts(s, folder, ends_in(path, ".gltf") ? ".bin" : ".webp");
+    free(folder);
+    return status;
+}
+
+int trip_context_find_files(trip_source *s, const char *path, const trip_volume_params *params)
+{
+    if (!trip_gaussian_file_is(path))
+        return trip_source_find(s, path, params);
+    *s = (trip_source){ .format = "gaussians" };
+    const int status = add_files(s, path);
+    if (status)
+        trip_source_free(s);
     return status;
 }
 
@@ -161,7 +215,7 @@ int triptych_brick_gaussians(triptych *t, const char *path, const char *data_set
 int triptych_is_gaussians(triptych *t, const char *path)
 {
     trip_scope *before = trip_context_enter_anew(t);
-    return trip_context_leave(before, trip_gaussian_file_is(path));
+    return trip_context_leave(before, trip_gaussian_set_is(path) ? 2 : trip_gaussian_file_is(path));
 }
 
 int triptych_describe_gaussians(triptych *t, const char *path, triptych_gaussians *out)

@@ -92,6 +92,8 @@ static int check(const triptych *t, bool *reference)
     if (r == TRIPTYCH_RENDERER_GL || r == TRIPTYCH_RENDERER_INTEGRAL)
         return trip_fail(TRIP_USAGE, "render", t->name,
                          "is a Gaussian scene; use --renderer cpu or reference");
+    if (t->given.splat.footprint == TRIPTYCH_FOOTPRINT_FIXED)
+        return trip_option_fail("--kernel", "fixed does not apply to Gaussian scenes");
     if (t->given.all.method == TRIPTYCH_METHOD_IMAGE)
         return trip_option_fail("--method", "image does not apply to Gaussian scenes");
     return draw_settings_check_kind(&t->given, true);
@@ -106,14 +108,20 @@ static int make_camera(triptych *t, int side)
     return trip_camera_make(&t->camera, &view, &identity);
 }
 
+static trip_gaussian_shape shape_of(triptych_footprint footprint)
+{
+    return footprint == TRIPTYCH_FOOTPRINT_EXACT ? TRIP_GAUSSIAN_EXACT
+           : footprint == TRIPTYCH_FOOTPRINT_EWA ? TRIP_GAUSSIAN_EWA
+                                                 : TRIP_GAUSSIAN_PROJECTED;
+}
+
 static trip_gaussian_settings settings_of(const triptych *t)
 {
     const draw_settings *g = &t->given;
     trip_gaussian_settings out = {
         .degree = g->scene.harmonics ? (int)g->scene.harmonics - 1 : TRIP_SH_DEGREE_MAX,
         .antialiased = t->scene->header.flags & TRIP_GAUSSIAN_ANTIALIASED,
-        .shape = g->splat.footprint == TRIPTYCH_FOOTPRINT_EXACT ? TRIP_GAUSSIAN_EXACT
-                                                                : TRIP_GAUSSIAN_PROJECTED,
+        .shape = shape_of(g->splat.footprint),
         .opacity_scale = t->scene_opacity,
         .early_termination = g->all.early_termination > 0 ? g->all.early_termination : 0,
         .clip = trip_context_clip(t),
@@ -214,7 +222,7 @@ int trip_context_take_scene(triptych *t, float *rgba, float *depth)
     if (!status && t->given.all.normalise)
         trip_normalise(rgba, (size_t)t->turned.width * (size_t)t->turned.height,
                        t->settings.background);
-    if (!status && !t->has_stats) {
+    if (!status) {
         snprintf(t->device, sizeof t->device, "%s", t->renderer->ops->device(t->renderer));
         t->stats = stats_of(t);
         t->has_stats = true;
@@ -248,6 +256,7 @@ void trip_context_explain_scene(const triptych *t, FILE *out)
                 (unsigned long long)s.window_records);
     fprintf(out, "footprint   %s%s\n",
             settings.shape == TRIP_GAUSSIAN_EXACT ? "exact, along each pixel's ray"
+            : settings.shape == TRIP_GAUSSIAN_EWA ? "EWA, projected at the centre without limits"
                                                   : "projected at the centre, as in training",
             settings.antialiased ? "; opacity compensated for the blur of pixels" : "");
 }

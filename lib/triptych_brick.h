@@ -299,7 +299,8 @@ typedef struct triptych_gaussians {
     double lo[3], hi[3]; /* of the centres */
 } triptych_gaussians;
 
-/* Returns 1 if a file is a Gaussian scene, otherwise 0. Reports nothing. */
+/* Returns 1 if a file is a Gaussian scene, 2 for the data set of one, otherwise 0. Reports nothing.
+ */
 TRIPTYCH_API int triptych_is_gaussians(triptych *t, const char *path);
 /* Reads a Gaussian scene and describes it. */
 TRIPTYCH_API int triptych_describe_gaussians(triptych *t, const char *path,
