@@ -97,8 +97,6 @@ static int open_data(drawing *d, const char *path)
     resources.keep_pages = d->sequence.frames > 1;
     resources.name = o->input;
     int status = triptych_open(d->t, path, &resources);
-    if (!status && triptych_is_scene(d->t) && o->more_count)
-        return trip_option_fail(o->input, "is a Gaussian scene; give one scene at a time");
     return status ? status : library_add(d->t, o->more, o->more_count, o->heat);
 }
 
@@ -125,8 +123,23 @@ static int open_volume(drawing *d)
     return status;
 }
 
+static int check_input(const drawing *d)
+{
+    const render_options *o = &d->o;
+    const bool is_scene = triptych_is_gaussians(d->t, o->input) != 0;
+    int status = draw_settings_check_kind(&o->settings, is_scene);
+    if (!status && is_scene && o->more_count)
+        status = trip_option_fail(o->input, "is a Gaussian scene; give one scene at a time");
+    if (!status && is_scene && o->quality.error > 0)
+        status = library_fail_scene_option("error");
+    return status;
+}
+
 static int open_input(drawing *d)
 {
+    const int checked = check_input(d);
+    if (checked)
+        return checked;
     if (cached_volume_wanted(d->o.input))
         return open_volume(d);
     int status = open_data(d, d->o.input);

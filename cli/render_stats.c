@@ -192,6 +192,10 @@ int render_stats_add_frame(render_stats *s, triptych *t)
         cJSON_AddNumberToObject(f, "light_bytes_read", (double)frame.light_bytes_read);
     if (frame.heat_memory_bytes)
         cJSON_AddNumberToObject(f, "heat_bytes_read", (double)frame.heat_bytes_read);
+    if (triptych_is_scene(t)) {
+        cJSON_AddNumberToObject(f, "gaussians", (double)frame.splats);
+        cJSON_AddNumberToObject(f, "bytes_read", (double)frame.bytes_read);
+    }
     cJSON *lists = cJSON_AddObjectToObject(f, "lists");
     if (!f || !lists || !cJSON_AddItemToArray(s->frames, f)) {
         cJSON_Delete(f);
