@@ -61,9 +61,8 @@ static int measure(const accuracy_options *o, accuracy_folder *folder, const cha
 static int check_data(const accuracy_options *o)
 {
     triptych *t = NULL;
-    int status = triptych_create(&t)
-                     ? trip_fail(TRIP_ERROR, "accuracy", "library", "out of memory")
-                     : 0;
+    int status =
+        triptych_create(&t) ? trip_fail(TRIP_ERROR, "accuracy", "library", "out of memory") : 0;
     for (int i = 0; i < o->data_count && !status; i++)
         if (triptych_is_gaussians(t, o->data[i]))
             status = trip_fail(TRIP_USAGE, "usage", o->data[i],

@@ -151,8 +151,8 @@ static void print_scene_text(const triptych_scene *s, const cJSON *notes, const 
     printf("%-12s %s\n", "up", s->y_down ? "-y" : "y");
     if (s->antialiased)
         printf("%-12s opacity is compensated for the blur of a pixel\n", "antialiased");
-    printf("%-12s %s in three lists of %llu bricks\n", "size",
-           trip_format_bytes(s->bytes, bytes), (unsigned long long)s->bricks);
+    printf("%-12s %s in three lists of %llu bricks\n", "size", trip_format_bytes(s->bytes, bytes),
+           (unsigned long long)s->bricks);
     print_note("source", notes, "input");
     print_note("file format", notes, "format");
     print_note("comments", notes, "trainer");

@@ -64,6 +64,8 @@ int library_fail_scene_option(const char *name)
 
 int library_check_scene_options(const triptych_brick_options *options)
 {
+    if (options->spacing[0] != 0) /* the table looks at a part of a number */
+        return library_fail_scene_option("spacing");
     for (size_t i = 0; i < volume_options_table.count; i++)
         if (trip_option_is_set(&volume_options_table.rows[i], options))
             return library_fail_scene_option(volume_options_table.rows[i].name);

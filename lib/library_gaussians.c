@@ -100,8 +100,8 @@ static int add_files(trip_source *s, const char *path)
 {
     const char *slash = strrchr(path, '/');
     char *folder = slash ? strndup(path, (size_t)(slash - path) + 1) : strdup(".");
-    int status = folder ? trip_source_add(s, path)
-                        : trip_fail(TRIP_ERROR, "read", path, "out of memory");
+    int status =
+        folder ? trip_source_add(s, path) : trip_fail(TRIP_ERROR, "read", path, "out of memory");
     if (!status && (ends_in(path, ".gltf") || ends_in(path, ".json")))
         status = add_parts(s, folder, ends_in(path, ".gltf") ? ".bin" : ".webp");
     free(folder);

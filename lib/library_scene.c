@@ -76,9 +76,12 @@ trip_view_object trip_context_scene_object(const triptych *t)
     const bool y_down = h->flags & TRIP_GAUSSIAN_Y_DOWN;
     o.up = y_down ? trip_v3(0, -1, 0) : trip_v3(0, 1, 0);
     o.front = y_down ? trip_v3(0, 0, -1) : trip_v3(0, 0, 1);
+    bool point = true;
+    for (int a = 0; a < 3; a++)
+        point &= h->typical_lo[a] >= h->typical_hi[a];
     for (int a = 0; a < 3; a++) {
-        o.lo[a] = h->typical_lo[a];
-        o.hi[a] = h->typical_hi[a];
+        o.lo[a] = point ? h->reach_lo[a] : h->typical_lo[a];
+        o.hi[a] = point ? h->reach_hi[a] : h->typical_hi[a];
     }
     return o;
 }

@@ -331,8 +331,8 @@ typedef enum triptych_quality {
     TRIPTYCH_QUALITY_DRAFT,   /* post, 4 of 255 */
     TRIPTYCH_QUALITY_NORMAL,  /* 1 of 255 */
     TRIPTYCH_QUALITY_HIGH,    /* post, 0.3 of 255 */
-    /* Post at the finest level, without a trial. It has 16 samples per sheet, and 4 to 16 rays along
-     * each side of a pixel: 4 or more for each voxel. Early termination is at 1/8192. */
+    /* Post at the finest level, without a trial. It has 16 samples per sheet, and 4 to 16 rays
+     * along each side of a pixel: 4 or more for each voxel. Early termination is at 1/8192. */
     TRIPTYCH_QUALITY_EXACT,
 } triptych_quality;
 
