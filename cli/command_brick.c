@@ -543,10 +543,12 @@ static int run(options *o)
     o->brick.functions = o->functions;
     o->brick.ranges = o->ranges;
     int status = library_create(&t, &progress);
+    const int scene = status ? 0 : triptych_is_gaussians(t, o->volume);
+    if (scene == 2)
+        status = trip_fail(TRIP_USAGE, "usage", o->volume,
+                           "is a data set already; `triptych render` draws it");
     if (!status)
-        status = triptych_is_gaussians(t, o->volume) == 1 ? brick_scene(t, o)
-                 : o->dry_run                             ? dry_run(t, o)
-                                                          : brick(t, o);
+        status = scene ? brick_scene(t, o) : o->dry_run ? dry_run(t, o) : brick(t, o);
     trip_progress_end(&progress);
     triptych_destroy(t);
     return status;
