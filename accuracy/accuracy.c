@@ -10,6 +10,7 @@
 #include "fastest.h"
 #include "measure.h"
 #include "report.h"
+#include "triptych_brick.h"
 #include "accuracy_report.h"
 #include "machine.h"
 
@@ -57,6 +58,19 @@ static int measure(const accuracy_options *o, accuracy_folder *folder, const cha
     return status;
 }
 
+static int check_data(const accuracy_options *o)
+{
+    triptych *t = NULL;
+    int status =
+        triptych_create(&t) ? trip_fail(TRIP_ERROR, "accuracy", "library", "out of memory") : 0;
+    for (int i = 0; i < o->data_count && !status; i++)
+        if (triptych_is_gaussians(t, o->data[i]))
+            status = trip_fail(TRIP_USAGE, "usage", o->data[i],
+                               "is a Gaussian scene; `triptych render` draws it");
+    triptych_destroy(t);
+    return status;
+}
+
 int trip_accuracy(int argc, char **argv)
 {
     accuracy_options o;
@@ -67,6 +81,8 @@ int trip_accuracy(int argc, char **argv)
         free(command);
         return print_settings();
     }
+    if (!status)
+        status = check_data(&o);
     if (!status && !o.output)
         o.output = output = accuracy_report_path(o.data[0]);
     if (!status && (!command || !o.output))

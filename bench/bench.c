@@ -9,6 +9,8 @@
 #include "bench_sample.h"
 #include "bench_tables.h"
 #include "command_line.h"
+#include "gaussian_file.h"
+#include "gaussian_set.h"
 #include "machine.h"
 #include "new_file.h"
 #include "read_files.h"
@@ -125,6 +127,9 @@ static int check_plot(const bench_options *o)
 static int measure(bench_options *o, bench_report *r)
 {
     const size_t table = table_of(o);
+    if (o->input && (trip_gaussian_set_is(o->input) || trip_gaussian_file_is(o->input)))
+        return trip_fail(TRIP_USAGE, "usage", o->input,
+                         "is a Gaussian scene; `triptych render` draws it");
     if (!o->input && tables[table].makes_volumes)
         bench_options_choose(o, false);
     o->progress = command_line_quiet() ? NULL : measure_progress_start(o->table);

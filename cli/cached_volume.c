@@ -265,7 +265,9 @@ static int brick(search *s)
     double begin = trip_now_seconds();
     int status = cache_folder_make_room(&v->folder, &v->key);
     if (status == 0)
-        status = triptych_brick(s->t, s->volume, v->path, &s->options, NULL);
+        status = triptych_is_gaussians(s->t, s->volume)
+                     ? triptych_brick_gaussians(s->t, s->volume, v->path, &s->options, NULL)
+                     : triptych_brick(s->t, s->volume, v->path, &s->options, NULL);
     if (status == 0 && (status = check_unchanged(s)) < 0)
         cache_folder_remove(&v->folder, &v->key, true);
     if (status < 0)
@@ -298,7 +300,10 @@ static int open_volume(search *s, bool making)
 {
     cached_volume *v = s->v;
     *v = (cached_volume){ .hold = -1 };
-    int status = cache_folder_open(&v->folder, true);
+    int status =
+        triptych_is_gaussians(s->t, s->volume) ? library_check_scene_options(&s->options) : 0;
+    if (status == 0)
+        status = cache_folder_open(&v->folder, true);
     if (status == 0)
         status = find_source(s);
     s->checksum = s->wish->checksum && *s->wish->checksum ? s->wish->checksum : NULL;

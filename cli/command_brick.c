@@ -10,6 +10,7 @@
 
 #include "brick_limits.h"
 #include "budget.h"
+#include "clock.h"
 #include "json.h"
 #include "library.h"
 #include "draw_options.h"
@@ -475,6 +476,66 @@ static int brick(triptych *t, const options *o)
     return 0;
 }
 
+/* ---- Gaussian scenes ---- */
+
+/* Refuses options that bricking a scene would ignore. */
+static int check_scene_options(const options *o)
+{
+    static const char *const used[] = { "force", "json", "output", "memory" };
+    for (size_t i = 0; i < brick_table.count; i++) {
+        bool is_used = !trip_option_is_set(&rows[i], o);
+        for (size_t n = 0; n < sizeof used / sizeof *used; n++)
+            is_used |= !strcmp(rows[i].name, used[n]);
+        if (!is_used)
+            return library_fail_scene_option(rows[i].name);
+    }
+    return library_check_scene_options(&o->brick);
+}
+
+static int print_scene(const options *o, const triptych_gaussians *g, uint64_t bytes,
+                       double seconds)
+{
+    char count[32], size[32], peak[32];
+    if (o->json) {
+        cJSON *root = cJSON_CreateObject();
+        cJSON_AddStringToObject(root, "output", o->output);
+        cJSON_AddStringToObject(root, "format", g->format);
+        add_number(root, "gaussians", (double)g->count);
+        add_number(root, "left_out", (double)g->left_out);
+        add_number(root, "degree", g->degree);
+        add_number(root, "bytes", (double)bytes);
+        add_number(root, "seconds", seconds);
+        add_number(root, "peak_rss_bytes", (double)trip_memory_peak_rss_bytes());
+        return print_object(root, o);
+    }
+    if (command_line_quiet())
+        return 0;
+    print_name("data set", o->output);
+    printf("%-9s %s Gaussians, harmonics up to degree %d (%s)\n", "scene",
+           size_print_count(g->count, count), g->degree, g->format);
+    printf("%-9s %s on disk, in three lists\n", "size", trip_format_bytes(bytes, size));
+    printf("%-9s %.2f s, %.2f million Gaussians/s\n", "time", seconds,
+           (double)g->count / 1e6 / (seconds > 0 ? seconds : 1));
+    printf("%-9s %s at peak\n", "memory", trip_format_bytes(trip_memory_peak_rss_bytes(), peak));
+    return 0;
+}
+
+static int brick_scene(triptych *t, const options *o)
+{
+    triptych_gaussians made;
+    triptych_scene scene;
+    int status = check_scene_options(o);
+    const double begun = trip_now_seconds();
+    if (!status)
+        status = triptych_brick_gaussians(t, o->volume, o->output, &o->brick, &made);
+    const double seconds = trip_now_seconds() - begun;
+    if (!status)
+        status = triptych_open(t, o->output, NULL);
+    if (!status)
+        status = triptych_get_scene(t, &scene);
+    return status ? status : print_scene(o, &made, scene.bytes, seconds);
+}
+
 static int run(options *o)
 {
     triptych *t = NULL;
@@ -482,8 +543,12 @@ static int run(options *o)
     o->brick.functions = o->functions;
     o->brick.ranges = o->ranges;
     int status = library_create(&t, &progress);
+    const int scene = status ? 0 : triptych_is_gaussians(t, o->volume);
+    if (scene == 2)
+        status = trip_fail(TRIP_USAGE, "usage", o->volume,
+                           "is a data set already; `triptych render` draws it");
     if (!status)
-        status = o->dry_run ? dry_run(t, o) : brick(t, o);
+        status = scene ? brick_scene(t, o) : o->dry_run ? dry_run(t, o) : brick(t, o);
     trip_progress_end(&progress);
     triptych_destroy(t);
     return status;
@@ -496,8 +561,9 @@ int trip_command_brick(int argc, char **argv)
                           { .table = &brick_table, .base = &o } };
     const command_line c = {
         .args_doc = "INPUT",
-        .doc = "Converts a volume into a data set that is drawn from disk: three lists of its "
-               "visible voxels, sorted along X, Y and Z.",
+        .doc =
+            "Converts a volume or a Gaussian scene into a data set that is drawn from disk: three "
+            "lists of its visible voxels or Gaussians, sorted along X, Y and Z.",
         .sets = sets,
         .set_count = 2,
         .argument = add_input,

@@ -11,6 +11,7 @@
 #include "budget.h"
 #include "cached_volume.h"
 #include "draw_options.h"
+#include "gaussian_info_print.h"
 #include "geometry.h"
 #include "json.h"
 #include "library.h"
@@ -529,6 +530,8 @@ static int show(const options *o, data_set *d, trip_budget *budget)
     int status = triptych_open(d->t, o->path, NULL);
     if (status == TRIP_OK && o->verify)
         status = triptych_verify(d->t);
+    if (status == TRIP_OK && triptych_is_scene(d->t))
+        return gaussian_info_print_scene(d->t, o->path, o->json, o->verify);
     if (status == TRIP_OK)
         status = triptych_get_info(d->t, &d->info);
     if (status == TRIP_OK)
@@ -566,8 +569,10 @@ int trip_command_info(int argc, char **argv)
     const command_line c = {
         .args_doc = "NAME.trip|VOLUME",
         .doc = "Prints the contents of a data set: grid, values, sizes and source. Of a volume, it "
-               "prints the grid, a look at the values, and the series of a DICOM folder. Of other "
-               "files, it prints what they are and what reads them.",
+               "prints the grid, a look at the values, and the series of a DICOM folder. Of a "
+               "Gaussian "
+               "scene, it prints count, degree and bounds. Of other files, it prints what they are "
+               "and what reads them.",
         .sets = p.sets,
         .set_count = SETS,
         .argument = add_input,
@@ -577,10 +582,11 @@ int trip_command_info(int argc, char **argv)
     data_set d = { 0 };
     int status = command_line_parse(&c, argc, argv);
     d.path = o.path;
-    const bool own = status == 0 && !o.verify && own_file_wanted(o.path);
-    if (status == 0 && !own)
+    if (status == 0)
         status = library_create(&d.t, NULL);
-    if (own)
+    if (status == 0 && gaussian_info_wanted(d.t, o.path))
+        status = gaussian_info_print(d.t, o.path, p.sets[VOLUME].given, o.json != 0);
+    else if (status == 0 && !o.verify && own_file_wanted(o.path))
         status = own_file_info(o.path, o.json != 0);
     else if (status == 0)
         status = cached_volume_wanted(o.path)

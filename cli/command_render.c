@@ -116,15 +116,30 @@ static int open_volume(drawing *d)
         status = quality_options_check_data(d->o.quality.measured, d->t, d->o.input);
     if (!status && d->o.field == RENDER_FIELD_SOURCE)
         status = triptych_set_source(d->t, d->o.input, &d->o.volume);
-    char *note = status == 0 ? library_note(d->t, "note") : NULL;
+    char *note = status == 0 && !triptych_is_scene(d->t) ? library_note(d->t, "note") : NULL;
     if (note)
         trip_note(d->o.input, "%s", note);
     free(note);
     return status;
 }
 
+static int check_input(const drawing *d)
+{
+    const render_options *o = &d->o;
+    const bool is_scene = triptych_is_gaussians(d->t, o->input) != 0;
+    int status = draw_settings_check_kind(&o->settings, is_scene);
+    if (!status && is_scene && o->more_count)
+        status = trip_option_fail(o->input, "is a Gaussian scene; give one scene at a time");
+    if (!status && is_scene && o->quality.error > 0)
+        status = library_fail_scene_option("error");
+    return status;
+}
+
 static int open_input(drawing *d)
 {
+    const int checked = check_input(d);
+    if (checked)
+        return checked;
     if (cached_volume_wanted(d->o.input))
         return open_volume(d);
     int status = open_data(d, d->o.input);

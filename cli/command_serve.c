@@ -70,6 +70,7 @@ static int parse_options(serve_options *o, int argc, char **argv)
 {
     const uint64_t only_tf = ~(UINT64_C(1) << LOOK_TF);
     const uint64_t files = UINT64_C(1) << DRAW_DEPTH | UINT64_C(1) << DRAW_COUNT;
+    const uint64_t scenes = UINT64_C(1) << DRAW_ORDER | UINT64_C(1) << DRAW_HARMONICS;
     const uint64_t integral = UINT64_C(1) << DRAW_FIELD | UINT64_C(1) << DRAW_TOLERANCE;
     const uint64_t others = UINT64_C(1) << RESOURCE_RENDERER | UINT64_C(1) << RESOURCE_OCCLUDED;
     parse p = { .o = o,
@@ -78,7 +79,7 @@ static int parse_options(serve_options *o, int argc, char **argv)
                     [LOOK] = { .table = &look_table, .base = &o->look, .without = only_tf },
                     [SETTINGS] = { .table = &draw_settings_table,
                                    .base = &o->params.settings,
-                                   .without = files | integral },
+                                   .without = files | integral | scenes },
                     [HEAT] = { .table = &heat_table, .base = &o->params.heat },
                     [QUALITY] = { .table = &quality_table, .base = &o->quality },
                     [RENDERER] = { .table = &viewer_renderer_table, .base = &o->resources },

@@ -1,10 +1,12 @@
 #include "library.h"
 
 #include <cjson/cJSON.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "command_line.h"
+#include "draw_options.h"
 #include "json.h"
 #include "report.h"
 
@@ -51,6 +53,28 @@ int library_check_heat(triptych *t, const char *heat, const triptych_resources *
 {
     int status = heat ? triptych_open(t, heat, resources) : 0;
     return status || !heat ? status : triptych_set_heat(t, heat);
+}
+
+int library_fail_scene_option(const char *name)
+{
+    char option[64];
+    snprintf(option, sizeof option, "--%s", name);
+    return trip_option_fail(option, "does not apply to Gaussian scenes");
+}
+
+int library_check_scene_options(const triptych_brick_options *options)
+{
+    if (options->spacing[0] != 0) /* the table looks at a part of a number */
+        return library_fail_scene_option("spacing");
+    for (size_t i = 0; i < volume_options_table.count; i++)
+        if (trip_option_is_set(&volume_options_table.rows[i], options))
+            return library_fail_scene_option(volume_options_table.rows[i].name);
+    return 0;
+}
+
+int library_fail_scene(const char *input)
+{
+    return trip_fail(TRIP_USAGE, "usage", input, "is a Gaussian scene; `triptych render` draws it");
 }
 
 void library_hush(triptych *t, bool quiet)

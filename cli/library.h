@@ -19,6 +19,13 @@ int library_add(triptych *t, const char *const *paths, int count, const char *he
 int library_check_heat(triptych *t, const char *heat, const triptych_resources *resources);
 
 /* Switches the messages of the context off or on. */
+/* Fails: an option does not apply to Gaussian scenes. */
+int library_fail_scene_option(const char *name);
+/* Fails if options for reading a volume were given for a Gaussian scene. */
+int library_check_scene_options(const triptych_brick_options *options);
+/* Fails: a command that needs volumes got a Gaussian scene. */
+int library_fail_scene(const char *input);
+
 void library_hush(triptych *t, bool quiet);
 /* Sets the transfer function without printing warnings. Reports failures. */
 int library_set_function_quietly(triptych *t, const triptych_transfer_function *function);

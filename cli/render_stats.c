@@ -109,9 +109,9 @@ static int each_list(triptych *t,
                      void (*one)(void *user, const char *name, const triptych_list_stats *s),
                      void *user)
 {
-    triptych_info info;
+    triptych_info info = { 0 };
     triptych_frame_stats frame;
-    int status = triptych_get_info(t, &info);
+    int status = triptych_is_scene(t) ? 0 : triptych_get_info(t, &info);
     if (!status)
         status = triptych_get_frame_stats(t, &frame);
     for (unsigned i = 0; !status && i < info.lists; i++) {
@@ -192,6 +192,10 @@ int render_stats_add_frame(render_stats *s, triptych *t)
         cJSON_AddNumberToObject(f, "light_bytes_read", (double)frame.light_bytes_read);
     if (frame.heat_memory_bytes)
         cJSON_AddNumberToObject(f, "heat_bytes_read", (double)frame.heat_bytes_read);
+    if (triptych_is_scene(t)) {
+        cJSON_AddNumberToObject(f, "gaussians", (double)frame.splats);
+        cJSON_AddNumberToObject(f, "bytes_read", (double)frame.bytes_read);
+    }
     cJSON *lists = cJSON_AddObjectToObject(f, "lists");
     if (!f || !lists || !cJSON_AddItemToArray(s->frames, f)) {
         cJSON_Delete(f);
@@ -245,6 +249,16 @@ static void add_interpolation(cJSON *root, triptych_interpolation drawn)
                                 draw_settings_choice(&s, DRAW_INTERPOLATION));
 }
 
+static void add_scene_method(cJSON *root, const draw_settings *s, const triptych_frame_stats *frame)
+{
+    cJSON_AddStringToObject(root, "order",
+                            s->scene.order == TRIPTYCH_ORDER_LISTS ? "lists" : "depth");
+    cJSON_AddStringToObject(root, "kernel",
+                            frame->footprint
+                                ? footprint_names[frame->footprint - TRIPTYCH_FOOTPRINT_EXACT]
+                                : "projected");
+}
+
 static void add_method(cJSON *root, const render_options *o, const triptych_frame_stats *frame)
 {
     add_interpolation(root, frame->interpolation);
@@ -281,7 +295,10 @@ int render_stats_describe(render_stats *s, const render_options *o, triptych *t)
         return status;
     cJSON_AddStringToObject(root, "renderer", frame.renderer);
     cJSON_AddStringToObject(root, "device", frame.device);
-    add_method(root, o, &frame);
+    if (triptych_is_scene(t))
+        add_scene_method(root, &o->settings, &frame);
+    else
+        add_method(root, o, &frame);
     if (frame.lod_px > 0)
         cJSON_AddNumberToObject(root, "lod_px", frame.lod_px);
     if (frame.rays > 0)
@@ -351,8 +368,11 @@ int render_stats_explain_plan(triptych *t, FILE *out)
 }
 
 /* Returns the name for the records that were read. */
-static const char *things_read(const render_options *o, const triptych_frame_stats *frame)
+static const char *things_read(const render_options *o, const triptych *t,
+                               const triptych_frame_stats *frame)
 {
+    if (triptych_is_scene(t))
+        return "Gaussians";
     const bool splats = o->resources.renderer == TRIPTYCH_RENDERER_INTEGRAL
                             ? o->field == RENDER_FIELD_SPLATS
                             : frame->classify == TRIPTYCH_CLASSIFY_PRE;
@@ -379,7 +399,7 @@ int render_stats_explain_cost(const render_options *o, triptych *t, FILE *out)
     char bytes[32], memory[32];
     triptych_frame_stats frame;
     int status = triptych_get_frame_stats(t, &frame);
-    costs c = { out, status ? "" : things_read(o, &frame) };
+    costs c = { out, status ? "" : things_read(o, t, &frame) };
     if (!status)
         status = each_list(t, explain_list, &c);
     if (status)
@@ -445,7 +465,7 @@ int render_stats_summary(const char *path, const render_options *o, triptych *t,
         return status;
     trip_text_write(out, path);
     fprintf(out, ": %d x %d, %s %s, %s read, %.2f s", o->view.view.width, o->view.view.height,
-            size_print_count(frame.splats, count), things_read(o, &frame),
+            size_print_count(frame.splats, count), things_read(o, t, &frame),
             trip_format_bytes(frame.bytes_read, text), frame.ms * 1e-3);
     write_promise(&frame, out);
     fputc('\n', out);

@@ -69,6 +69,9 @@ static bool is_text(const file *f)
 
 /* ---- formats with a mark at a fixed place ---- */
 
+/* The end of the line for scenes that trip_gaussian_file_open() reads. */
+#define DESCRIBED "; `triptych info FILE` describes it"
+
 typedef struct mark {
     size_t at;
     const char *bytes;
@@ -104,7 +107,7 @@ static const mark marks[] = {
     MARK(0, "glTF", "is a glTF scene of meshes, not a volume; Blender opens it"),
     MARK(0, "LASF", "is a LAS or LAZ file of points, not a volume; CloudCompare opens it"),
     MARK(0, "ASTM-E57", "is an E57 file of scanned points, not a volume; CloudCompare opens it"),
-    MARK(0, "NGSP", "is a scene of Gaussian splats (SPZ), not a volume; SuperSplat opens it"),
+    MARK(0, "NGSP", "is a scene of Gaussian splats (SPZ), not a volume" DESCRIBED),
     MARK(0, "\xff\xd8\xff",
          "is a JPEG picture; TIFF, PNG and EXR are read: ImageMagick converts it "
          "with `convert FILE FILE.png`"),
@@ -165,6 +168,15 @@ static double ply_count(const char *head, const char *element)
     return at && sscanf(at + strlen(line), "%lf", &count) == 1 ? count : -1;
 }
 
+/* Gaussian splats in glTF. Other tests tell meshes. */
+static bool tell_gltf(const file *f)
+{
+    if ((!begins(f, "glTF") && !ends_in(f, ".gltf")) || !holds(f, "\"KHR_gaussian_splatting\""))
+        return false;
+    SAY("is a scene of Gaussian splats (glTF), not a volume" DESCRIBED);
+    return true;
+}
+
 /* Tells meshes, points and Gaussian splats apart by the header. */
 static bool tell_ply(const file *f)
 {
@@ -179,10 +191,10 @@ static bool tell_ply(const file *f)
     if (end)
         *end = 0;
     const double points = ply_count(head, "vertex");
-    if (strstr(head, " scale_0") && strstr(head, " rot_0"))
-        SAY("is a scene of %.0f Gaussian splats (PLY), not a volume; SuperSplat opens it", points);
+    if (strstr(head, " scale_0") || strstr(head, " rot_0") || strstr(head, " f_dc_0"))
+        SAY("is a scene of %.0f Gaussian splats (PLY), not a volume" DESCRIBED, points);
     else if (strstr(head, "\nelement chunk ") && strstr(head, "packed_position"))
-        SAY("is a compressed scene of Gaussian splats (PLY), not a volume; SuperSplat opens it");
+        SAY("is a compressed scene of Gaussian splats (PLY), not a volume" DESCRIBED);
     else if (ply_count(head, "face") > 0 || ply_count(head, "tristrips") > 0)
         SAY("is a mesh (PLY) of %.0f vertices, not a volume; MeshLab or ParaView opens it", points);
     else
@@ -326,8 +338,8 @@ static bool tell_zip(const file *f)
     if (ends_in(f, ".npz"))
         SAY("is an archive of NumPy arrays (.npz); Python's numpy.load reads them, and tofile() "
             "writes raw data");
-    else if (ends_in(f, ".sog"))
-        SAY("is a scene of Gaussian splats (SOG), not a volume; SuperSplat opens it");
+    else if (ends_in(f, ".sog") || holds(f, "means_l.webp"))
+        SAY("is a scene of Gaussian splats (SOG), not a volume" DESCRIBED);
     else
         SAY("is a ZIP archive; unpack it with `unzip FILE`, then give a file or folder of it");
     return true;
@@ -409,7 +421,7 @@ static bool is_script(const file *f)
         memcpy(word + 1, line, n);
         word[n + 1] = ' ';
         const bool blank = length == 0 || line[0] == '#' || line[0] == '\r';
-        const bool whole = end || f->bytes < TRIP_OTHER_HEAD_BYTES;
+        const bool whole = end || f->bytes < TRIP_OTHER_HEAD_BYTES || length > sizeof word;
         if (!blank && whole &&
             (n == 0 || (n < length && !is_blank(line[n]) && line[n] != '\r') ||
              !strstr(words, word)))
@@ -469,6 +481,10 @@ static trip_other_kind tell_own_text(const file *f)
         SAY("is a transfer function; --tf FILE draws with it, and `triptych tf show FILE` prints "
             "it");
         return TRIP_OTHER_FUNCTION;
+    }
+    if (begins(f, "{") && holds(f, "\"means\"") && holds(f, ".webp\"")) {
+        SAY("is a scene of Gaussian splats (SOG), not a volume" DESCRIBED);
+        return TRIP_OTHER_FOREIGN;
     }
     if (is_script(f)) {
         SAY("is a script for the viewer; `triptych view VOLUME --script FILE` replays it");
@@ -543,8 +559,8 @@ static bool tell_name(const file *f)
     static const struct {
         const char *suffix, *text;
     } names[] = {
-        { ".splat", "is a scene of Gaussian splats (.splat), not a volume; SuperSplat opens it" },
-        { ".ksplat", "is a scene of Gaussian splats (.ksplat), not a volume; SuperSplat opens it" },
+        { ".splat", "is a scene of Gaussian splats (.splat), not a volume" DESCRIBED },
+        { ".ksplat", "is a scene of Gaussian splats (.ksplat), not a volume" DESCRIBED },
         { ".3ds", "is a mesh (3DS), not a volume; Blender or MeshLab opens it" },
         { ".fbx", "is a scene of meshes (FBX), not a volume; Blender opens it" },
         { ".mat", "is a MATLAB file (v4); MATLAB, GNU Octave or Python's scipy.io reads it" },
@@ -578,7 +594,7 @@ static trip_other_kind tell(const file *f)
         SAY("is the index of a data set; give the folder that holds it");
         return TRIP_OTHER_INDEX;
     }
-    if (tell_ply(f) || tell_numpy(f) || tell_mrc(f) || tell_pcd(f) || tell_zip(f) ||
+    if (tell_gltf(f) || tell_ply(f) || tell_numpy(f) || tell_mrc(f) || tell_pcd(f) || tell_zip(f) ||
         tell_marks(f) || tell_short_marks(f) || tell_analyze(f))
         return TRIP_OTHER_FOREIGN;
     if (is_text(f) && !(begins(f, "solid") && holds(f, "facet")))

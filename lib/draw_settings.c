@@ -288,6 +288,8 @@ static const char *const primitives[] = { "sprites", "triangles", NULL };
 static const char *const targets[] = { "rgba32f", "rgba16f", "rgba8", NULL };
 static const char *const traversals[] = { "outward", "ascending", NULL };
 static const char *const weights[] = { "pixel", "vertex", NULL };
+static const char *const orders[] = { "depth", "lists", NULL };
+static const char *const degrees[] = { "0", "1", "2", "3", NULL };
 
 #define CHOICE(names) .type = TRIP_OPTION_CHOICE, .choices = (names), .first = 1
 
@@ -483,6 +485,16 @@ static const trip_option rows[DRAW_OPTIONS] = {
                        "from the corners of splats, which implies --renderer reference",
                        "pixel", "pre only", .group = DRAW_GROUP_PAPERS, .measured = true,
                        AT(splat.weights), CHOICE(weights) },
+    [DRAW_ORDER] = { "order", "depth|lists",
+                     "Selects the order of the Gaussians of a scene: by the depth of their "
+                     "centres, "
+                     "or by the three lists, which sorts nothing",
+                     "depth", "Gaussian scenes only", .group = DRAW_GROUP_ACCURACY,
+                     .measured = true, AT(scene.order), CHOICE(orders) },
+    [DRAW_HARMONICS] = { "sh", "DEGREE",
+                         "Reads spherical harmonics up to this degree: 0, 1, 2 or 3",
+                         "all of the scene", "Gaussian scenes only", .group = DRAW_GROUP_ACCURACY,
+                         .measured = true, AT(scene.harmonics), CHOICE(degrees) },
 };
 
 const trip_option_table draw_settings_table = { rows, DRAW_OPTIONS };
@@ -495,6 +507,7 @@ triptych_settings draw_settings_public(const draw_settings *s)
     out.background = s->has_background ? s->background : NULL;
     out.splat = &s->splat;
     out.sheet = &s->sheet;
+    out.scene = &s->scene;
     out.integral = &s->integral;
     out.lod = &s->lod;
     out.light = &s->light;
@@ -519,6 +532,7 @@ draw_settings draw_settings_of(const triptych_settings *s)
     out.all.group = NULL
     TAKE(splat);
     TAKE(sheet);
+    TAKE(scene);
     TAKE(integral);
     TAKE(lod);
     TAKE(light);

@@ -15,6 +15,7 @@ typedef struct draw_settings {
     triptych_settings all; /* its pointers are NULL */
     triptych_splat_settings splat;
     triptych_sheet_settings sheet;
+    triptych_scene_settings scene;
     triptych_integral_settings integral;
     triptych_lod_settings lod;
     triptych_light light;
@@ -90,6 +91,8 @@ enum {
     DRAW_TARGET,
     DRAW_TRAVERSAL,
     DRAW_WEIGHTS,
+    DRAW_ORDER,
+    DRAW_HARMONICS, /* named "sh" */
     DRAW_OPTIONS
 };
 
@@ -123,6 +126,8 @@ int draw_settings_check_ranges(const draw_settings *s);
 /* Checks every range and rule, as triptych_check_settings() does. With `idle_too`, also refuses
  * settings that only have no effect. */
 int draw_settings_check(const draw_settings *s, triptych_renderer *renderer, bool idle_too);
+/* Checks that all settings apply to the open data: a Gaussian scene or a volume. */
+int draw_settings_check_kind(const draw_settings *s, bool is_scene);
 /* Unsets all settings that the other settings or the renderer exclude. */
 void draw_settings_drop_excluded(draw_settings *s, triptych_renderer renderer);
 /* Returns the name of a given setting that only splats have, or NULL. */

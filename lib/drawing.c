@@ -1,6 +1,7 @@
 /* The frames of triptych.h: begin, steps, picture, end. */
 #include <string.h>
 
+#include "gaussian_frame.h"
 #include "clock.h"
 #include "library_context.h"
 #include "cpu/cpu_renderer.h"
@@ -357,6 +358,8 @@ static int prepare(triptych *t)
     int status = trip_context_check_idle(t, true);
     if (!status)
         status = draw_settings_check(&t->given, &renderer, false);
+    if (!status)
+        status = draw_settings_check_kind(&t->given, false);
     if (status)
         return status;
     if (t->renderer && t->required != renderer)
@@ -474,6 +477,8 @@ int triptych_choose(triptych *t)
 {
     trip_scope *before = trip_context_enter_anew(t);
     const int later = t->resources.choose_later;
+    if (t->scene) /* it has no choices of quality */
+        return trip_context_leave(before, trip_context_check_idle(t, true));
     int status = prepare(t);
     if (!status)
         status = choose_settings(t);
@@ -584,6 +589,8 @@ static int start(triptych *t)
 
 static void end(triptych *t)
 {
+    if (t->scene)
+        trip_context_end_scene(t);
     if (t->drawn)
         trip_frame_end(&t->drawing);
     if (t->begun)
@@ -596,8 +603,8 @@ static void end(triptych *t)
 int triptych_begin(triptych *t)
 {
     trip_scope *before = trip_context_enter_anew(t);
-    int status = prepare(t);
-    if (status)
+    int status = t->scene ? trip_context_begin_scene(t) : prepare(t);
+    if (status || t->scene)
         return trip_context_leave(before, status);
     status = plan_first(t);
     if (!status)
@@ -620,15 +627,14 @@ int triptych_await(triptych *t, uint64_t timeout_ns)
 {
     trip_scope *before = trip_context_enter(t);
     int status = check_drawing(t);
-    if (!status)
+    if (!status && !t->scene)
         trip_frame_await(&t->drawing, timeout_ns);
     if (!status && trip_interrupted())
         status = trip_fail(TRIP_INTERRUPTED, "render", t->name, "interrupted");
     return trip_context_leave(before, status);
 }
 
-/* Averages each square of `side` x `side` pixels of `fine`. */
-static void take_means(const float *fine, int side, int width, int height, float *rgba)
+void trip_context_take_means(const float *fine, int side, int width, int height, float *rgba)
 {
     const size_t row = (size_t)width * (size_t)side * 4;
     for (int y = 0; y < height; y++)
@@ -668,7 +674,7 @@ static int take_colours(triptych *t, float *rgba, float *depth)
     float *fine = t->before + pictures_of_parts(t) * 4 * pixels_drawn(t);
     int status = take_drawn(t, fine, NULL);
     if (!status)
-        take_means(fine, side, t->turned.width, rows_drawn(t) / side, rgba);
+        trip_context_take_means(fine, side, t->turned.width, rows_drawn(t) / side, rgba);
     return status;
 }
 
@@ -732,6 +738,8 @@ int triptych_step(triptych *t, uint64_t deadline_ns)
 {
     trip_scope *before = trip_context_enter(t);
     int status = check_drawing(t);
+    if (!status && t->scene)
+        return trip_context_leave(before, trip_gaussian_frame_step(t->scene_frame, deadline_ns));
     if (!status)
         status = trip_frame_step(&t->drawing, deadline_ns);
     while (status == TRIP_FRAME_DONE && has_next(t)) {
@@ -764,8 +772,9 @@ static int take_picture(triptych *t, float *rgba, float *depth)
         status = trip_fail(TRIP_USAGE, "render", "depth", "%s",
                            depth ? "the frame was begun without distances"
                                  : "the frame has distances; use triptych_picture_and_depth()");
-    if (!status)
-        status = take_bands(t, rgba, depth);
+    if (status || t->scene)
+        return status ? status : trip_context_take_scene(t, rgba, depth);
+    status = take_bands(t, rgba, depth);
     if (!status && t->settings.show == TRIP_SHOW_MERGE)
         draw_merge_map(t, rgba);
     if (!status && t->drawing.done)
@@ -789,8 +798,10 @@ void triptych_end(triptych *t)
 {
     trip_scope *before = trip_scope_enter(&t->scope); /* keeps the error of the last call */
     end(t);
-    keep_small_before(t);
-    drop_banded(t);
+    if (!t->scene) {
+        keep_small_before(t);
+        drop_banded(t);
+    }
     trip_context_leave(before, 0);
 }
 

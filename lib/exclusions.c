@@ -311,6 +311,19 @@ int draw_settings_check(const draw_settings *s, triptych_renderer *renderer, boo
     return broken ? fail_rule(broken, given_rows(s)) : 0;
 }
 
+int draw_settings_check_kind(const draw_settings *s, bool is_scene)
+{
+    static const uint64_t of_scenes = ROW(ORDER) | ROW(HARMONICS);
+    static const uint64_t of_both = ROW(BACKGROUND) | ROW(CLIP_BOX) | ROW(CLIP_PLANE) |
+                                    ROW(EARLY_TERMINATION) | ROW(FOOTPRINT) | ROW(SAMPLES) |
+                                    ROW(DEPTH) | ROW(NORMALISE) | ROW(METHOD) | ROW(H);
+    const struct rule of_kind = {
+        .given = is_scene ? ~(of_scenes | of_both) : of_scenes,
+        .why = is_scene ? "does not apply to Gaussian scenes" : "applies to Gaussian scenes only",
+    };
+    return of_kind.given & given_rows(s) ? fail_rule(&of_kind, given_rows(s)) : 0;
+}
+
 void draw_settings_drop_excluded(draw_settings *s, triptych_renderer renderer)
 {
     const draw_settings unset = { 0 };

@@ -20,7 +20,7 @@ int triptych_get_histogram(triptych *t, triptych_histogram *out)
     trip_scope *before = trip_context_enter(t);
     trip_histogram histogram;
     *out = (triptych_histogram){ 0 };
-    int status = trip_context_check_open(t);
+    int status = trip_context_check_volume(t);
     if (!status)
         status = session_read_text(&t->session);
     if (!status && trip_dataset_metadata_histogram(t->session.text, &histogram)) {
@@ -89,7 +89,7 @@ static const char *name_of(const triptych *t, const triptych_conversion *c)
 
 static int check(const triptych *t, const triptych_conversion *c)
 {
-    int status = trip_context_check_idle(t, false);
+    int status = t->scene ? trip_context_check_volume(t) : trip_context_check_idle(t, false);
     bool known = c->form >= TRIPTYCH_FORM_TF && c->form <= TRIPTYCH_FORM_VTK;
     if (!status && !known)
         return trip_fail(TRIP_USAGE, "tf", name_of(t, c), "unknown format");

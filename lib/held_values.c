@@ -69,6 +69,8 @@ int triptych_holds(triptych *t, const triptych_brick_options *options,
     trip_envelope e = { 0 };
     int status = trip_context_check_idle(t, true);
     if (!status)
+        status = trip_context_check_volume(t);
+    if (!status)
         status = session_read_text(&t->session);
     if (!status && options)
         status = add_kept(&e, &t->session, options);

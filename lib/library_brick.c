@@ -9,6 +9,8 @@
 #include "brick.h"
 #include "brick_metadata.h"
 #include "estimate.h"
+#include "gaussian_file.h"
+#include "gaussian_format.h"
 #include "glance.h"
 #include "library_context.h"
 #include "identity.h"
@@ -276,12 +278,24 @@ static void show_bytes(void *user, uint64_t done, uint64_t total)
     trip_context_show_stage(user, "look", done, total);
 }
 
+/* Raise this with every change that makes the same scene give another data set. */
+enum { GAUSSIAN_BRICKER_VERSION = 1 };
+
+static int describe_scene_form(const trip_brick_params *params, char **text)
+{
+    if (asprintf(text, "gaussians %d %d\n", GAUSSIAN_BRICKER_VERSION, TRIP_GAUSSIAN_VERSION) >= 0)
+        return 0;
+    *text = NULL;
+    return trip_fail(TRIP_ERROR, "brick", params->input, "out of memory");
+}
+
 /* Describes the options and the version of the program, since another version may make a different
  * data set of the same volume. */
 static int describe_form(const trip_brick_params *params, char **text)
 {
     char *form = NULL;
-    int status = trip_brick_form_text(params, &form);
+    int status = trip_gaussian_file_is(params->input) ? describe_scene_form(params, &form)
+                                                      : trip_brick_form_text(params, &form);
     if (status)
         return status;
     int length = asprintf(text, "%s" TRIP_VERSION "\n", form);
@@ -295,7 +309,9 @@ static int describe_form(const trip_brick_params *params, char **text)
 static int identify_kept(const trip_brick_params *params, triptych_identity *out)
 {
     char *text = NULL;
-    int status = trip_brick_kept_text(params, &text);
+    const bool is_scene = trip_gaussian_file_is(params->input); /* keeps all of its Gaussians */
+    int status =
+        is_scene ? describe_scene_form(params, &text) : trip_brick_kept_text(params, &text);
     if (status)
         return status;
     const trip_digest kept = trip_source_digest_text(text);
@@ -310,7 +326,7 @@ static int identify(triptych *t, const trip_brick_params *params, uint64_t max_c
     trip_source source = { 0 };
     trip_digest state = { "" }, content = { "" };
     char *text = NULL;
-    int status = trip_source_find(&source, params->input, &params->volume);
+    int status = trip_context_find_files(&source, params->input, &params->volume);
     if (!status)
         status = describe_form(params, &text);
     if (!status)
@@ -353,7 +369,7 @@ static int list_files(const char *volume, const triptych_brick_options *o,
     if (fault)
         return trip_fail(TRIP_USAGE, "read", volume, "%s", fault);
     const trip_volume_params params = volume_params(o);
-    int status = trip_source_find(&source, volume, &params);
+    int status = trip_context_find_files(&source, volume, &params);
     for (size_t i = 0; i < source.count && status >= 0; i++)
         status = found(user, source.files[i].path);
     trip_source_free(&source);
@@ -494,6 +510,8 @@ static int use_source(triptych *t, const char *path, const triptych_brick_option
 {
     const char *fault = fault_of_volume(o);
     int status = trip_context_check_idle(t, true);
+    if (!status)
+        status = trip_context_check_volume(t);
     if (!status && fault)
         status = trip_fail(TRIP_USAGE, "read", path, "%s", fault);
     if (!status && t->resources.renderer != TRIPTYCH_RENDERER_INTEGRAL)

@@ -9,6 +9,7 @@
 #include "camera.h"
 #include "library_context.h"
 #include "dataset_level.h"
+#include "gaussian_set.h"
 #include "report.h"
 
 /* ---- contexts ---- */
@@ -140,7 +141,7 @@ int trip_context_check_idle(const triptych *t, bool needs_data)
 
 int trip_context_check_list(const triptych *t, unsigned number)
 {
-    int status = trip_context_check_open(t);
+    int status = trip_context_check_volume(t);
     if (!status && number >= t->session.data->list_count)
         return trip_fail(TRIP_USAGE, "render", t->name,
                          "has %u lists, numbered from 0; there is no list %u",
@@ -246,6 +247,7 @@ static void close_data(triptych *t)
     t->source = NULL;
     trip_context_drop_level(t);
     trip_context_drop_heat(t);
+    trip_context_close_scene(t);
     session_close(&t->session);
     free(t->name);
     t->name = NULL;
@@ -295,8 +297,12 @@ int triptych_open(triptych *t, const char *path, const triptych_resources *resou
     free(t->choices_folder);
     t->choices_folder = wanted.choices_folder ? strdup(wanted.choices_folder) : NULL;
     t->choices_read = 0;
-    status = t->name ? session_open_data(&t->session, path, wanted.memory_bytes)
-                     : trip_fail(TRIP_ERROR, "render", path, "out of memory");
+    if (!t->name)
+        status = trip_fail(TRIP_ERROR, "render", path, "out of memory");
+    else if (trip_gaussian_set_is(path))
+        status = trip_context_open_scene(t, path, wanted.memory_bytes);
+    else
+        status = session_open_data(&t->session, path, wanted.memory_bytes);
     t->open = status == 0;
     if (!t->open)
         close_data(t);
@@ -309,6 +315,8 @@ int triptych_add(triptych *t, const char *path)
 {
     trip_scope *before = trip_context_enter_anew(t);
     int status = trip_context_check_idle(t, true);
+    if (!status)
+        status = trip_context_check_volume(t);
     if (status)
         return trip_context_leave(before, status);
     trip_context_drop_stats(t);
@@ -431,7 +439,7 @@ static triptych_info info_of(const trip_dataset *d)
 int triptych_get_info(triptych *t, triptych_info *out)
 {
     trip_scope *before = trip_context_enter(t);
-    int status = trip_context_check_open(t);
+    int status = trip_context_check_volume(t);
     *out = status ? (triptych_info){ 0 } : info_of(t->session.data);
     return trip_context_leave(before, status);
 }
@@ -471,7 +479,7 @@ int triptych_count_levels(triptych *t, triptych_classify classify, unsigned *lev
 {
     trip_scope *before = trip_context_enter(t);
     const trip_kind kind = classify == TRIPTYCH_CLASSIFY_PRE ? TRIP_KIND_MEANS : TRIP_KIND_VALUES;
-    int status = trip_context_check_open(t);
+    int status = trip_context_check_volume(t);
     *levels = status ? 0 : trip_dataset_levels(t->session.data, kind);
     return trip_context_leave(before, status);
 }
@@ -489,6 +497,7 @@ int triptych_verify(triptych *t)
     trip_scope *before = trip_context_enter_anew(t);
     int status = trip_context_check_idle(t, true);
     if (!status)
-        status = verify_parts(&t->session);
+        status = t->scene ? trip_gaussian_set_verify(t->scene, t->session.budget)
+                          : verify_parts(&t->session);
     return trip_context_leave(before, status);
 }

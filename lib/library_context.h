@@ -9,6 +9,7 @@
 #include "draw_settings.h"
 #include "emission.h"
 #include "frame.h"
+#include "framing.h"
 #include "field.h"
 #include "image_file.h"
 #include "light_map.h"
@@ -17,6 +18,7 @@
 #include "library_session.h"
 #include "quality_choice.h"
 #include "sheet_samples.h"
+#include "source.h"
 #include "triptych.h"
 
 enum { TRIP_CONTEXT_MAX_THREADS = 256, TRIP_CONTEXT_NOTES = 8 };
@@ -43,7 +45,11 @@ struct triptych {
 
     triptych_resources resources;
     char *name;
-    session session;
+    session session;                         /* of a scene: the budget and the name alone */
+    struct trip_gaussian_set *scene;         /* NULL: the data set is a volume */
+    struct trip_gaussian_frame *scene_frame; /* the begun frame of a scene */
+    double scene_opacity;                    /* factor of the optical depth; 0 means 1 */
+    double begun_ms;                         /* when scene_frame was begun */
     bool open, has_function;
     trip_context_picture *pictures;
     trip_field *source;      /* values of the volume itself; NULL: the data set's values */
@@ -173,6 +179,21 @@ void trip_context_explain_effects(const triptych *t, FILE *out);
 /* Records the statistics of the frame, once its picture is complete. */
 int trip_context_note_stats(triptych *t);
 void trip_context_drop_stats(triptych *t);
+
+/* Gaussian scenes (library_scene.c): like the functions for volumes, inside the context's scope. */
+/* Finds the files of a volume or of a Gaussian scene. */
+int trip_context_find_files(trip_source *s, const char *path, const trip_volume_params *params);
+int trip_context_open_scene(triptych *t, const char *path, uint64_t memory_bytes);
+void trip_context_close_scene(triptych *t);
+/* Fails with TRIP_USAGE (reported) unless a volume is open. */
+int trip_context_check_volume(const triptych *t);
+trip_view_object trip_context_scene_object(const triptych *t);
+int trip_context_begin_scene(triptych *t);
+int trip_context_take_scene(triptych *t, float *rgba, float *depth);
+void trip_context_end_scene(triptych *t);
+void trip_context_explain_scene(const triptych *t, FILE *out);
+/* Averages each square of `side` x `side` pixels of `fine`. */
+void trip_context_take_means(const float *fine, int side, int width, int height, float *rgba);
 
 /* Reports the progress of bricking. `user` is a context with a progress function. */
 void trip_context_show_stage(void *user, const char *stage, uint64_t done, uint64_t total);

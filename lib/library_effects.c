@@ -107,6 +107,8 @@ int triptych_set_heat(triptych *t, const char *path)
 {
     trip_scope *before = trip_context_enter_anew(t);
     int status = trip_context_check_idle(t, true);
+    if (!status)
+        status = trip_context_check_volume(t);
     if (status)
         return trip_context_leave(before, status);
     trip_context_drop_heat(t);

@@ -42,6 +42,17 @@ static int check_function(const triptych_transfer_function *f)
                            "the window must be finite and at least 0, and its level finite");
 }
 
+/* A Gaussian scene has colours of its own. */
+static int use_scene_function(triptych *t, const triptych_transfer_function *f)
+{
+    if (f->name || f->text || f->window > 0)
+        return trip_fail(
+            TRIP_USAGE, "render", t->name,
+            "is a Gaussian scene with colours of its own; leave out --tf and --window");
+    t->scene_opacity = f->opacity_scale;
+    return 0;
+}
+
 int triptych_set_transfer_function(triptych *t, const triptych_transfer_function *function)
 {
     trip_scope *before = trip_context_enter_anew(t);
@@ -50,7 +61,11 @@ int triptych_set_transfer_function(triptych *t, const triptych_transfer_function
     int status = trip_context_check_idle(t, true);
     if (!status)
         status = check_function(f);
-    return trip_context_leave(before, status ? status : trip_context_use_transfer_function(t, f));
+    if (!status && t->scene)
+        status = use_scene_function(t, f);
+    else if (!status)
+        status = trip_context_use_transfer_function(t, f);
+    return trip_context_leave(before, status);
 }
 
 /* ---- settings ---- */

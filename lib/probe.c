@@ -57,6 +57,8 @@ static int find_hit(triptych *t, trip_ray_probe *probe, triptych_hit *out)
 static int prepare(triptych *t, double x, double y, trip_camera *camera)
 {
     int status = trip_context_check_idle(t, true);
+    if (!status)
+        status = trip_context_check_volume(t);
     if (!status && !(isfinite(x) && isfinite(y)))
         status = trip_fail(TRIP_USAGE, "render", "probe", "the position is not finite");
     if (!status && !t->has_view)

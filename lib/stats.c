@@ -68,12 +68,13 @@ int triptych_explain(triptych *t, char **text)
     *text = NULL;
     int status = t->drawn ? 0 : trip_fail(TRIP_USAGE, "render", "frame", "no frame is begun");
     FILE *f = status ? NULL : open_memstream(text, &bytes);
-    if (f)
+    if (f && t->scene)
+        trip_context_explain_scene(t, f);
+    if (f && !t->scene) {
         explain_choices(t, f);
-    if (f)
         trip_plan_explain(&t->plan, t->session.data, &t->drawn_settings, f);
-    if (f)
         trip_context_explain_effects(t, f);
+    }
     if (!status && (!f || fclose(f) != 0)) {
         free(*text);
         *text = NULL;

@@ -207,6 +207,27 @@ typedef struct triptych_info {
  */
 TRIPTYCH_API int triptych_get_info(triptych *t, triptych_info *out);
 
+/* An open data set of a Gaussian scene. Lengths are in units of the scene. */
+typedef struct triptych_scene {
+    uint64_t gaussians, bricks; /* bricks of the three lists */
+    uint64_t bytes;             /* of all files */
+    int degree;                 /* of the spherical harmonics, 0 to 3 */
+    int antialiased;            /* trained with opacities that make up for the blur of pixels */
+    int flat;                   /* surfels: each has no thickness along one axis */
+    int y_down;                 /* the scene's y axis points down */
+    double lo[3], hi[3];        /* bounds of all centres */
+    /* Bounds of the centres without the outer 1 % on each side. Views fit these. */
+    double typical_lo[3], typical_hi[3];
+    const char *notes; /* JSON; belongs to the data set */
+} triptych_scene;
+
+/* Returns 1 if the open data set is a Gaussian scene. These functions do not apply to scenes, and
+ * fail with TRIPTYCH_USAGE: triptych_get_info(), triptych_get_list(), triptych_add(), and those
+ * about values, heat and probes. */
+TRIPTYCH_API int triptych_is_scene(const triptych *t);
+/* Describes the open scene. Fails with TRIPTYCH_USAGE if a volume or nothing is open. */
+TRIPTYCH_API int triptych_get_scene(triptych *t, triptych_scene *out);
+
 /* A list: records of one kind along one axis at one level of detail. */
 typedef struct triptych_list {
     const char *path; /* of the data set that has the list; valid until it is closed */
@@ -550,6 +571,30 @@ typedef struct triptych_clip {
     double plane[6][4];
 } triptych_clip;
 
+/* The order in which the Gaussians of a scene are drawn. */
+typedef enum triptych_order {
+    TRIPTYCH_ORDER_DEFAULT, /* depth */
+    TRIPTYCH_ORDER_DEPTH,   /* by the depth of their centres, as scenes are trained */
+    /* By their coordinates along X, Y and Z. The layers of the three lists are blended. Nothing is
+     * sorted, and nothing pops when the view turns. */
+    TRIPTYCH_ORDER_LISTS,
+} triptych_order;
+
+/* The highest degree of the spherical harmonics of a scene that are read and drawn. */
+typedef enum triptych_harmonics {
+    TRIPTYCH_HARMONICS_DEFAULT, /* all that the scene has */
+    TRIPTYCH_HARMONICS_0,
+    TRIPTYCH_HARMONICS_1,
+    TRIPTYCH_HARMONICS_2,
+    TRIPTYCH_HARMONICS_3,
+} triptych_harmonics;
+
+/* Settings of Gaussian scenes. */
+typedef struct triptych_scene_settings {
+    triptych_order order;
+    triptych_harmonics harmonics;
+} triptych_scene_settings;
+
 /* The settings of a picture. NULL selects the defaults of a group. */
 typedef struct triptych_settings {
     triptych_quality quality;
@@ -581,6 +626,7 @@ typedef struct triptych_settings {
     const double *background;
     const triptych_splat_settings *splat;
     const triptych_sheet_settings *sheet;
+    const triptych_scene_settings *scene;
     const triptych_integral_settings *integral;
     const triptych_lod_settings *lod;
     const triptych_light *light;

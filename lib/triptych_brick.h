@@ -286,6 +286,31 @@ TRIPTYCH_API int triptych_describe(triptych *t, const char *volume,
                                    const triptych_brick_options *options, triptych_description *out,
                                    triptych_text_callback series, void *user);
 
+/* A Gaussian scene: splats with shapes of their own. */
+typedef struct triptych_gaussians {
+    char format[32];     /* "3DGS PLY", ... */
+    char trainer[256];   /* the program that trained or wrote it, and other comments; or "" */
+    char up[3];          /* the axis that points up: "x", "y", "z", or with a minus */
+    uint64_t count;      /* of Gaussians, without those that are left out */
+    uint64_t left_out;   /* Gaussians with a value that is not finite */
+    int degree;          /* of spherical harmonics, 0 to 3 */
+    int antialiased;     /* not 0: trained with a compensated opacity */
+    int flat;            /* not 0: surfels, with two deviations each */
+    double lo[3], hi[3]; /* of the centres */
+} triptych_gaussians;
+
+/* Returns 1 if a file is a Gaussian scene, 2 for the data set of one, otherwise 0. Reports nothing.
+ */
+TRIPTYCH_API int triptych_is_gaussians(triptych *t, const char *path);
+/* Reads a Gaussian scene and describes it. */
+TRIPTYCH_API int triptych_describe_gaussians(triptych *t, const char *path,
+                                             triptych_gaussians *out);
+/* Bricks a Gaussian scene. Of the options, only `replace` and `memory_bytes` apply. *out describes
+ * the scene; NULL is allowed. */
+TRIPTYCH_API int triptych_brick_gaussians(triptych *t, const char *path, const char *data_set,
+                                          const triptych_brick_options *options,
+                                          triptych_gaussians *out);
+
 /* The range of a part of a volume's values. */
 typedef struct triptych_values {
     double share; /* of the volume; 1 for all of it, 0 if nothing is known */

@@ -34,5 +34,5 @@ fi
 
 cmake --preset arm64 -DTRIP_WERROR=ON
 cmake --build --preset arm64
-[ $# -gt 0 ] || set -- -R '^test_cpu' -j "$(nproc)"
+[ $# -gt 0 ] || set -- -R '^test_(cpu|gaussian)' -j "$(nproc)"
 ctest --preset arm64 "$@"

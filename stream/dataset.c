@@ -19,8 +19,20 @@ const char *trip_plane_file_name(int axis, unsigned level, trip_kind kind, int p
     return name;
 }
 
+/* Whether a Gaussian scene has a file of this name, such as "x.gaussians" or "x.harmonics1". */
+static bool is_gaussian_file(const char *name)
+{
+    if (!*name || !strchr("xyz", *name))
+        return false;
+    if (!strcmp(name + 1, ".gaussians"))
+        return true;
+    return !strncmp(name + 1, ".harmonics", 10) && name[11] >= '1' && name[11] <= '3' && !name[12];
+}
+
 bool trip_plane_file_is_named(const char *name)
 {
+    if (is_gaussian_file(name))
+        return true;
     char own[32], *end;
     unsigned long level = strtoul(name + (*name != 0), &end, 10);
     if (level > UINT32_MAX)

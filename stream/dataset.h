@@ -100,7 +100,7 @@ static inline double trip_list_sheet_coordinate(const trip_list *list, int64_t s
 /* Writes the name of a plane file, such as "x0.voxels", to `name` (at least 32 bytes). */
 const char *trip_plane_file_name(int axis, unsigned level, trip_kind kind, int plane, char *name);
 const char *trip_list_plane_name(const trip_list *list, int plane, char *name);
-/* Whether some list's plane file has this name. */
+/* Whether some list's plane file has this name, of a volume or of a Gaussian scene. */
 bool trip_plane_file_is_named(const char *name);
 
 #endif

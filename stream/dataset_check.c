@@ -38,6 +38,8 @@ static int check_identity(const trip_file_header *h, uint64_t file_bytes, const 
 {
     trip_file_header copy = *h;
     copy.header_checksum = 0;
+    if (memcmp(h->magic, TRIP_GAUSSIAN_MAGIC, sizeof h->magic) == 0)
+        return FAIL_FIELD(magic, "the data set of a Gaussian scene, where a volume is needed");
     if (memcmp(h->magic, TRIP_MAGIC, sizeof h->magic) != 0)
         return FAIL_FIELD(magic, "not the index of a data set (no " TRIP_MAGIC ")");
     if (h->version > 0 && h->version < TRIP_FORMAT_OLDEST)

@@ -30,6 +30,7 @@
 #include <stdint.h>
 
 #define TRIP_MAGIC "TRIPTYCH"
+#define TRIP_GAUSSIAN_MAGIC "TRIPGAUS" /* of a Gaussian scene (gaussians/gaussian_format.h) */
 #define TRIP_FORMAT_VERSION 7
 #define TRIP_FORMAT_OLDEST 6 /* the oldest version that is read; it has no deviations */
 #define TRIP_HEADER_BYTES 1024

@@ -206,6 +206,11 @@ static int open_data(trip_frames *f)
                                                       .choices_folder = p->choices_folder,
                                                       .choose_later = 1,
                                                       .name = w->input });
+    if (!status && triptych_is_scene(f->t)) {
+        triptych_close(f->t);
+        status = trip_fail(TRIP_USAGE, "view", w->input,
+                           "is a Gaussian scene; `triptych render` draws it");
+    }
     if (!status && w->heat)
         status = open_heat(f);
     f->open = status == 0;

@@ -51,6 +51,11 @@ static int add_file(void *user, const char *path)
     return 0;
 }
 
+int trip_source_add(trip_source *s, const char *path)
+{
+    return add_file(s, path);
+}
+
 int trip_source_find(trip_source *s, const char *path, const trip_volume_params *params)
 {
     const trip_volume_reader *reader;

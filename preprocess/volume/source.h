@@ -27,6 +27,8 @@ typedef struct trip_source {
 /* Finds every file that the volume is read from. For a folder or a pattern there may be more.
  * `path` is as for trip_volume_open(). Reports failures. */
 int trip_source_find(trip_source *s, const char *path, const trip_volume_params *params);
+/* Adds a file to a source that is zeroed or found. The caller sets `format`. */
+int trip_source_add(trip_source *s, const char *path);
 void trip_source_free(trip_source *s);
 
 /* Returns false if a file changed in the last two seconds. A further change might then leave its

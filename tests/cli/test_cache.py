@@ -536,8 +536,13 @@ class Cache(program.ProgramTest):
         self.addCleanup(run.kill)
         def held():
             folder = f"/proc/{run.pid}/fd"
-            links = [os.path.join(folder, fd) for fd in os.listdir(folder)]
-            return any(drawn in os.readlink(link) for link in links if os.path.islink(link))
+            for fd in os.listdir(folder):
+                try:
+                    if drawn in os.readlink(os.path.join(folder, fd)):
+                        return True
+                except FileNotFoundError:
+                    pass  # closed since it was listed
+            return False
         while run.poll() is None and not held():
             time.sleep(0.001)
         run.send_signal(signal.SIGSTOP)

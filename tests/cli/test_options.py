@@ -121,6 +121,8 @@ RENDER = {
     "--low-pass": NAMES + ["gaussian"],
     "--low-pass-width": NUMBERS + ["-1", "17", "none"],
     "--weights": NAMES,
+    "--order": NAMES,
+    "--sh": NUMBERS + ["-1", "4", "1.5"],
     "--normalise": None,
     "--flatten": NUMBERS + ["0", "0.5", "1e9"],
     "--target": NAMES,

@@ -67,16 +67,9 @@ FILES = [
     ("a.ply", ply(*VERTICES, "element face 1", "property list uchar int vertex_indices"),
      "a mesh (PLY) of 3 vertices", "MeshLab"),
     ("b.ply", ply(*VERTICES), "a cloud of 3 points (PLY)", "CloudCompare"),
-    ("c.ply", ply(*VERTICES, *(f"property float {n}" for n in
-                               ("f_dc_0", "opacity", "scale_0", "scale_1", "scale_2", "rot_0"))),
-     "3 Gaussian splats (PLY)", "SuperSplat"),
     ("d.ply.gz", gzip.compress(ply(*VERTICES)), "a cloud of 3 points (PLY)", "CloudCompare"),
     ("e.ply.bz2", bz2.compress(ply(*VERTICES)), "a cloud of 3 points (PLY)", "CloudCompare"),
     ("no-suffix", ply(*VERTICES), "a cloud of 3 points (PLY)", "CloudCompare"),
-    ("a.spz", gzip.compress(b"NGSP" + bytes(60)), "Gaussian splats (SPZ)", "SuperSplat"),
-    ("b.spz", b"NGSP\4\0\0\0" + bytes(60), "Gaussian splats (SPZ)", "SuperSplat"),
-    ("a.splat", struct.pack("<6f8B", *[1.5] * 6, *range(8)), "Gaussian splats (.splat)",
-     "SuperSplat"),
     ("a.stl", b"solid a\nfacet normal 0 0 1\nouter loop\n", "a mesh (STL)", "MeshLab"),
     ("binary", bytes(80) + struct.pack("<I", 2) + bytes(100), "a mesh (STL)", "MeshLab"),
     ("a.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "a mesh (OBJ)", "MeshLab"),
@@ -120,7 +113,23 @@ FILES = [
     ("a.jpg", b"\xff\xd8\xff\xe0" + bytes(40), "JPEG", "convert"),
     ("a.csv", b"x,y,z\n1,2,3\n4,5,6\n7,8,9\n", "table of numbers", "NRRD"),
     ("a.txt", b"hello\n" * 9, "is text", "not a volume"),
+    ("b.txt", b"{" + b"hello " * 900, "is text", "not a volume"),
     ("program", b"\x7fELF" + bytes(60), "a program", "not a volume"),
+]
+
+# Gaussian scenes that are cut short or lack a part.
+DAMAGED_SCENES = [
+    ("c.ply", ply(*VERTICES, *(f"property float {n}" for n in
+                               ("f_dc_0", "opacity", "scale_0", "scale_1", "scale_2", "rot_0")))),
+    ("d.ply", ply("element chunk 1", "property float min_x", "element vertex 3",
+                  "property uint packed_position")),
+    ("a.spz", gzip.compress(b"NGSP" + bytes(60))),
+    ("b.spz", b"NGSP\4\0\0\0" + bytes(60)),
+    ("a.sog", archive(zipfile.ZipFile, "w")),
+    ("meta.json", b'{"means": {"files": ["a.webp"]}, "scales": [' + b"1, " * 2000),
+    ("a.glb", b'glTF\2\0\0\0' + bytes(12) + b'{"extensionsUsed": ["KHR_gaussian_splatting"]}'),
+    ("a.gltf", b'{"extensionsUsed": ["KHR_gaussian_splatting"]}'),
+    ("a.ksplat", bytes([0, 1]) + bytes(5000)),
 ]
 
 OWN = [
@@ -148,6 +157,28 @@ class OtherFiles(program.ProgramTest):
             for command in ("render", name, "-o", "a.png"), ("brick", name, "-o", "a.trip"), \
                            ("view", name), ("serve", name):
                 self.leaves_nothing(1, *command, says=says)
+
+    def test_damaged_gaussian_scenes_are_refused_with_their_names(self):
+        for name, data in DAMAGED_SCENES:
+            program.write(name, data)
+            for command in ("render", name, "-o", "a.png"), ("brick", name, "-o", "a.trip"):
+                self.leaves_nothing(1, *command, says=f"triptych: read: {name}: ")
+
+    def test_info_describes_a_gaussian_scene(self):
+        program.write("a.splat", struct.pack("<6f8B", 1, 2, 3, 0.1, 0.2, 0.3, *range(8)) +
+                      struct.pack("<6f8B", -1, 2, 9, 0.1, 0.2, 0.3, *range(8)) +
+                      struct.pack("<6f8B", float("nan"), 2, 9, 0.1, 0.2, 0.3, *range(8)))
+        done = self.works("info", "a.splat", "--json")
+        self.assertIn("1 of 3 Gaussians hold a value that is not finite", done.stderr)
+        self.assertEqual(json.loads(done.stdout), {
+            "kind": "Gaussian scene", "format": ".splat", "gaussians": 2, "left_out": 1, "degree": 0,
+            "antialiased": False, "flat": False, "up": "-y", "trainer": "",
+            "bounds": [[-1, 2, 3], [1, 2, 9]]})
+        text = self.works("info", "a.splat").stdout.decode()
+        for line in ("scene        a.splat", "Gaussians    2", "left out     1",
+                     "centres      x -1 to 1, y 2 to 2, z 3 to 9", "up           -y"):
+            self.assertIn(line + "\n", text)
+        self.fails(2, "info", "a.splat", "--spacing", "1,1,1", says="Gaussian scene")
 
     def test_the_options_for_raw_data_read_the_file(self):
         for name, data in ("a.npy", npy(ARRAY)), ("a.mrc", mrc()):

@@ -1,6 +1,7 @@
 /* Vector types and operations for the CPU renderer's kernels, over AVX-512, AVX2 + FMA, NEON and
  * plain C (the compiler's vectors with four floats). Each isa_*.c defines TRIP_SIMD as one of the
- * numbers below and includes the kernels. Nothing else includes this file.
+ * numbers below and includes the kernels. So does each gaussians/tiles_*.c. Nothing else includes
+ * this file.
  *
  *   vf, vi   V floats or 32-bit integers; operators do + - * / and arithmetic without comparisons
  *   vd       V / 2 doubles; a pair (lo, hi) has the lanes of one vf

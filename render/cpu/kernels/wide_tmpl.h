@@ -123,7 +123,8 @@ INLINE void find_wide_positions(const trip_cpu_group *g, const pane_path *path, 
 /* The cubic kernel overshoots the codes of its voxels by at most 0.4765625 of their range
  * (trip_field_code_bounds()). The maximum times 2^WEIGHT_LOG2, doubled, fits 32 bits. */
 #define OVERSHOT_MAX 64000
-static_assert(OVERSHOT_MAX >= TRIP_CPU_CODE_BIAS + 65535 * 0.4765625, "no code is cut");
+static_assert((OVERSHOT_MAX - TRIP_CPU_CODE_BIAS) * INT64_C(10000000) >= 65535 * INT64_C(4765625),
+              "no code is cut");
 static_assert(OVERSHOT_MAX <= INT32_MAX / 2 >> WEIGHT_LOG2, "differences of codes");
 
 /* Does the work of sample_at() at one end of a segment. */

@@ -1,0 +1,25 @@
+/* A Gaussian splat of a scene: an ellipsoid with a density that falls from its centre as
+ * exp(-d^2 / 2), where d counts standard deviations. Its opacity is that of a ray through the
+ * centre (Zwicker et al. 2001; Kerbl et al. 2023). A flat one has a deviation of 0: a surfel. */
+#ifndef TRIP_GAUSSIAN_H
+#define TRIP_GAUSSIAN_H
+
+enum { TRIP_SH_DEGREE_MAX = 3, TRIP_SH_MAX = 16 };
+
+typedef struct trip_gaussian {
+    double centre[3];
+    float deviations[3]; /* standard deviations along the principal axes, in units of the scene */
+    float rotation[4];   /* w, x, y, z; unit length; from the principal axes to the scene */
+    float opacity;       /* 0 to 1 */
+    /* Spherical harmonics of the display colour: coefficient, then channel. The colour is 0.5 plus
+     * their sum (gaussian_colour.h). Coefficients beyond the scene's degree are 0. */
+    float sh[TRIP_SH_MAX][3];
+} trip_gaussian;
+
+/* Returns the number of coefficients up to a degree: 1, 4, 9 or 16. */
+static inline int trip_sh_count(int degree)
+{
+    return (degree + 1) * (degree + 1);
+}
+
+#endif

@@ -1,0 +1,43 @@
+/* Bricks a Gaussian scene: writes its data set from a source of splats, in the memory of a budget.
+ * The data set depends on the splats and their order alone, not on the memory. An interruption, a
+ * failure or a full disk leaves no file. */
+#ifndef TRIP_BRICK_GAUSSIANS_H
+#define TRIP_BRICK_GAUSSIANS_H
+
+#include <stdbool.h>
+
+#include "budget.h"
+#include "gaussian.h"
+
+/* Writes up to `room` splats to `out` and sets *got to their number; 0 means the end. Returns 0 or
+ * a negative trip_status after a report. */
+typedef int trip_gaussian_source(void *user, trip_gaussian *out, size_t room, size_t *got);
+
+/* Zero means the default. */
+typedef struct trip_brick_gaussians_params {
+    const char *path; /* of the data set */
+    bool replace;     /* replaces an existing data set */
+    trip_gaussian_source *source;
+    void *source_user;
+    const char *source_name; /* for messages; NULL means `path` */
+    int degree;              /* of the spherical harmonics that are kept, 0 to 3 */
+    uint32_t flags;          /* trip_gaussian_flag (gaussian_format.h) */
+    const char *text;        /* JSON that the data set keeps; NULL means "{}" */
+    /* Folder for temporary files, which have no names. NULL means the new data set's folder. */
+    const char *temporary;
+    /* Called now and then by the bricking thread. A scene is done when it has passed 4 times: it is
+     * read once and sorted thrice. May be NULL. */
+    void (*progress)(void *user, uint64_t passed);
+    void *progress_user;
+} trip_brick_gaussians_params;
+
+typedef struct trip_brick_gaussians_result {
+    uint64_t records;
+    uint64_t dropped; /* splats without finite values; a warning tells their number */
+} trip_brick_gaussians_result;
+
+/* `result` may be NULL. */
+int trip_brick_gaussians(const trip_brick_gaussians_params *params, trip_budget *budget,
+                         trip_brick_gaussians_result *result);
+
+#endif

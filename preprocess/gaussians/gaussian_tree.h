@@ -1,0 +1,60 @@
+/* The division of a Gaussian scene into bricks along one axis. Slabs divide the coordinate along
+ * the axis. Tiles divide a slab in the other two coordinates. A sample of the centres decides
+ * where. Each class of size has bricks of its own. The division depends on the records alone. One
+ * thread.
+ */
+#ifndef TRIP_GAUSSIAN_TREE_H
+#define TRIP_GAUSSIAN_TREE_H
+
+#include "budget.h"
+#include "key_sort.h"
+
+enum {
+    TRIP_GAUSSIAN_CLASSES = 256,    /* class c has the index c + 128 */
+    TRIP_GAUSSIAN_BRICK_AIM = 4096, /* records of a brick, about */
+};
+
+typedef struct trip_gaussian_point {
+    double centre[3];
+    int32_t class_index;
+    int32_t reserved;
+} trip_gaussian_point;
+
+typedef struct trip_gaussian_sample {
+    trip_gaussian_point *points;
+    uint64_t count;
+} trip_gaussian_sample;
+
+/* A child below 0 is the leaf ~child. Centres below `value` go to the left. */
+typedef struct trip_gaussian_node {
+    double value;
+    int64_t left, right;
+    int32_t axis, reserved;
+} trip_gaussian_node;
+
+typedef struct trip_gaussian_leaf {
+    uint64_t records; /* counted by the caller */
+    int32_t class_index, reserved;
+} trip_gaussian_leaf;
+
+typedef struct trip_gaussian_tree {
+    int64_t roots[TRIP_GAUSSIAN_CLASSES]; /* children, as in a node */
+    trip_gaussian_node *nodes;
+    trip_gaussian_leaf *leaves; /* by class, then slab, then tile */
+    uint64_t node_count, leaf_count, room;
+    trip_budget *budget;
+} trip_gaussian_tree;
+
+/* Whether a record belongs to the sample, from its number and the number of records. */
+int trip_gaussian_is_sampled(uint64_t number, uint64_t records);
+/* Returns the largest number of points in a sample of so many records. */
+uint64_t trip_gaussian_sample_room(uint64_t records);
+
+/* `records` counts the records by class index. Returns false if the budget is too small. */
+bool trip_gaussian_tree_build(trip_gaussian_tree *t, const trip_gaussian_sample *sample, int axis,
+                              const uint64_t records[TRIP_GAUSSIAN_CLASSES], trip_budget *budget);
+uint64_t trip_gaussian_tree_leaf(const trip_gaussian_tree *t, const double centre[3],
+                                 int class_index);
+void trip_gaussian_tree_free(trip_gaussian_tree *t);
+
+#endif

@@ -1,0 +1,51 @@
+/* Draws one picture of a Gaussian scene, in steps: streams its Gaussians in the order of drawing,
+ * composites them into layers, and merges the layers.
+ *
+ * - By depth there is one layer, in the order of the centres' view depth.
+ * - By lists there is a layer for each axis that has weight in the picture. Its Gaussians come in
+ *   the order of their coordinate along the axis, outwards from the eye. Layers are merged with
+ *   w^2 (equation 3 of Hofsetz, Max & Bastos 2008; weight.h).
+ *
+ * A layer ends early once no pixel takes more. One thread; the runner lends others. */
+#ifndef TRIP_GAUSSIAN_FRAME_H
+#define TRIP_GAUSSIAN_FRAME_H
+
+#include "gaussian_picture.h"
+#include "gaussian_stream.h"
+#include "settings.h"
+#include "task_runner.h"
+
+typedef struct trip_gaussian_frame trip_gaussian_frame;
+
+/* The set and the camera must outlive the frame. */
+typedef struct trip_gaussian_frame_params {
+    const trip_gaussian_set *set;
+    const trip_camera *camera; /* index space is the scene's space */
+    trip_gaussian_settings settings;
+    /* For the order by lists: its method and h. NULL: by depth. */
+    const trip_settings *by_lists;
+    bool reference; /* draws in double precision, without threads */
+    trip_budget *budget;
+    trip_task_runner runner;
+} trip_gaussian_frame_params;
+
+typedef struct trip_gaussian_frame_stats {
+    uint64_t gaussians; /* drawn from the streams, over all layers */
+    uint64_t bricks, bytes_read;
+    uint64_t window_records; /* the most that a window can hold */
+    unsigned layers;
+    double draw_ms, read_ms, merge_ms;
+} trip_gaussian_frame_stats;
+
+/* Fails (reported) before it reads anything if the budget is too small. */
+int trip_gaussian_frame_begin(trip_gaussian_frame **out, const trip_gaussian_frame_params *params);
+/* Draws until the deadline (CLOCK_MONOTONIC), and at least one batch. Returns TRIP_FRAME_DONE or
+ * TRIP_FRAME_MORE (renderer.h), or a failure. */
+int trip_gaussian_frame_step(trip_gaussian_frame *f, uint64_t deadline_ns);
+/* Writes the picture drawn so far: width * height * 4 floats, premultiplied, row 0 at the top, over
+ * the background. With settings.depth also width * height distances; otherwise `depth` is NULL. */
+int trip_gaussian_frame_picture(trip_gaussian_frame *f, float *rgba, float *depth);
+trip_gaussian_frame_stats trip_gaussian_frame_get_stats(const trip_gaussian_frame *f);
+void trip_gaussian_frame_end(trip_gaussian_frame *f); /* NULL is allowed */
+
+#endif

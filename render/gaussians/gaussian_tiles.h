@@ -1,0 +1,65 @@
+/* Compositing of footprints into a tile of the picture, and its kernels in several instruction
+ * sets. The kernels are pure functions of their arguments and give the same bits in every
+ * instruction set, since they fuse no operations. Any thread may call them with its own tile. */
+#ifndef TRIP_GAUSSIAN_TILES_H
+#define TRIP_GAUSSIAN_TILES_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+/* A tile is a square of the picture. It consists of blocks of 4 x 4 pixels, row by row, and a block
+ * of 16 pixels, row by row. A tile has one plane of floats for
+ * each number of the enumeration. */
+enum {
+    TRIP_TILE_PX = 16,
+    TRIP_TILE_PIXELS = TRIP_TILE_PX * TRIP_TILE_PX,
+    TRIP_TILE_BLOCKS = TRIP_TILE_PIXELS / 16,
+    TRIP_TILE_T = 0, /* transmittance; negative once the pixel is closed: takes no more */
+    TRIP_TILE_RED,
+    TRIP_TILE_GREEN,
+    TRIP_TILE_BLUE,
+    TRIP_TILE_DEPTH, /* sum of T alpha z; only if depth is wanted */
+    TRIP_TILE_PLANES_MAX,
+};
+
+/* A projected Gaussian (gaussian_footprint.h). */
+typedef struct trip_projected {
+    double x, y;                      /* pixels */
+    float across, across_shear, down; /* across_shear is across times shear */
+    float limit;                      /* a little above the q at which alpha is 1/255 */
+    float opacity, rgb[3], z;
+    float reach_x, reach_y;
+    uint32_t curved; /* 1 or 0 */
+} trip_projected;
+
+_Static_assert(sizeof(trip_projected) == 64, "a projected Gaussian fills a cache line");
+
+/* The rest of a curved footprint. Bounds count from its centre. */
+typedef struct trip_curve {
+    float bend_x, bend_y, tilt, skew, turn;
+    float left, right, top, bottom;
+} trip_curve;
+
+typedef struct trip_tile_kernels {
+    const char *isa;
+    /* Draws splats[list[0]] to splats[list[count - 1]] into the tile with its corner at pixel (x,
+     * y). `curves` has an element for each splat, or is NULL if none is curved. `open` has a bit
+     * for each block with an open pixel. Without `depth`, its plane may be missing. */
+    void (*draw)(float *planes, uint16_t *open, const trip_projected *splats,
+                 const trip_curve *curves, const uint32_t *list, size_t count, int x, int y,
+                 float termination, bool depth);
+} trip_tile_kernels;
+
+/* Returns the kernels for the instruction set that the CPU renderer uses (cpu/kernels/isa.h), or
+ * the one with this name. NULL or "" selects the widest. Reports TRIP_USAGE and returns NULL if it
+ * cannot run here. */
+const trip_tile_kernels *trip_tile_kernels_choose(const char *isa);
+
+/* Returns the position of pixel (x, y) of a tile in its planes. */
+static inline int trip_tile_place(int x, int y)
+{
+    return ((y >> 2) * (TRIP_TILE_PX / 4) + (x >> 2)) * 16 + (y & 3) * 4 + (x & 3);
+}
+
+#endif

@@ -1,0 +1,82 @@
+/* The bytes of the data set of a Gaussian scene. GAUSSIANS.md describes them for people. Fixed
+ * width, little-endian, no pointers. Reserved bits are zero; other values are refused.
+ *
+ *   index.trip                    header, bricks of the lists along X, Y and Z, text
+ *   x.gaussians                   records of the list along X, by brick; likewise Y and Z
+ *   x.harmonics1 .. x.harmonics3  coefficients of degree 1 to 3 of the same records */
+#ifndef TRIP_GAUSSIAN_FORMAT_H
+#define TRIP_GAUSSIAN_FORMAT_H
+
+#include <assert.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "format.h"
+
+#define TRIP_GAUSSIAN_VERSION 1
+#define TRIP_GAUSSIAN_HEADER_BYTES 512
+
+enum {
+    TRIP_GAUSSIAN_RECORD_BYTES = 24,
+    TRIP_GAUSSIAN_BRICK_RECORDS_MAX = 6144,
+    TRIP_GAUSSIAN_PLANES = 4, /* records, and coefficients of degree 1 to 3 */
+};
+
+/* A splat counts as nothing beyond so many deviations: exp(-3.33^2 / 2) < 1 / 255. */
+#define TRIP_GAUSSIAN_REACH 3.33
+
+enum trip_gaussian_flag {
+    TRIP_GAUSSIAN_ANTIALIASED = 1, /* trained with opacities that make up for the blur of pixels */
+    TRIP_GAUSSIAN_FLAT = 2,        /* surfels: the third deviation is 0 everywhere */
+    TRIP_GAUSSIAN_Y_DOWN = 4,      /* the scene's y axis points down */
+    TRIP_GAUSSIAN_FLAGS = 7,
+};
+
+typedef struct trip_file_gaussian_header {
+    char magic[8];             /* TRIP_GAUSSIAN_MAGIC, without a terminator */
+    uint32_t version;          /* TRIP_GAUSSIAN_VERSION */
+    uint32_t header_bytes;     /* TRIP_GAUSSIAN_HEADER_BYTES */
+    uint64_t header_checksum;  /* XXH64 of the header with this field zero */
+    uint64_t tables_checksum;  /* XXH64 of all bytes behind the header */
+    uint64_t index_bytes;      /* length of index.trip */
+    uint64_t records;          /* of each list */
+    uint32_t degree;           /* of the spherical harmonics, 0 to 3 */
+    uint32_t flags;            /* trip_gaussian_flag */
+    uint64_t brick_count[3];   /* of the lists along X, Y, Z */
+    uint64_t bricks_offset[3]; /* trip_file_gaussian_brick[brick_count] */
+    uint64_t text_offset;      /* UTF-8 JSON, at the end of the file */
+    uint64_t text_bytes;
+    double centre_lo[3], centre_hi[3];   /* bounds of all centres */
+    double reach_lo[3], reach_hi[3];     /* bounds of all ellipsoids of TRIP_GAUSSIAN_REACH */
+    double typical_lo[3], typical_hi[3]; /* bounds of the centres without the outer 1 % a side */
+    uint8_t reserved[TRIP_GAUSSIAN_HEADER_BYTES - 264];
+} trip_file_gaussian_header;
+
+typedef struct trip_file_gaussian_brick {
+    double centre_lo[3], centre_hi[3]; /* bounds of the centres; codes of centres count from them */
+    double reach_lo[3], reach_hi[3];   /* bounds of the ellipsoids of TRIP_GAUSSIAN_REACH */
+    uint64_t first_record;
+    uint32_t records;                 /* 1 to TRIP_GAUSSIAN_BRICK_RECORDS_MAX */
+    int32_t size_class;               /* trip_gaussian_size_class() of the records */
+    float log_lo, log_hi;             /* natural logarithms of the deviations, except zeros */
+    float colour_lo[3], colour_hi[3]; /* of the coefficient of degree 0, by channel */
+    float scale[3];                   /* largest magnitude of the coefficients of degree 1 to 3 */
+    float opacity_max;
+    uint64_t checksums[TRIP_GAUSSIAN_PLANES]; /* XXH64 of the brick's bytes in each file */
+} trip_file_gaussian_brick;
+
+static_assert(sizeof(trip_file_gaussian_header) == TRIP_GAUSSIAN_HEADER_BYTES, "header size");
+static_assert(offsetof(trip_file_gaussian_header, records) == 40, "header layout");
+static_assert(offsetof(trip_file_gaussian_header, centre_lo) == 120, "header layout");
+static_assert(offsetof(trip_file_gaussian_header, reserved) == 264, "header layout");
+static_assert(sizeof(trip_file_gaussian_brick) == 192, "brick size");
+static_assert(offsetof(trip_file_gaussian_brick, first_record) == 96, "brick layout");
+static_assert(offsetof(trip_file_gaussian_brick, checksums) == 160, "brick layout");
+
+/* Returns the bytes of a record in a plane: 24, 9, 15 or 21. */
+static inline unsigned trip_gaussian_plane_bytes(unsigned plane)
+{
+    return plane ? 3 * (2 * plane + 1) : TRIP_GAUSSIAN_RECORD_BYTES;
+}
+
+#endif

@@ -1,0 +1,83 @@
+/* A stream of a Gaussian scene's splats in exact ascending order of a key. The key is an affine
+ * function of the centre: the view depth, or the coordinate of a list in either direction. Equal
+ * keys keep the order of the list's records.
+ *
+ * The stream reads bricks in order of the least key of their box. A splat is final if its key is
+ * below the least key of all bricks that are not yet read. A window holds the splats that are not
+ * final. The index tells beforehand how many these can be. One thread. */
+#ifndef TRIP_GAUSSIAN_STREAM_H
+#define TRIP_GAUSSIAN_STREAM_H
+
+#include "gaussian.h"
+#include "gaussian_set.h"
+
+typedef struct trip_gaussian_stream trip_gaussian_stream;
+
+/* The key of a centre: direction * centre + offset. */
+typedef struct trip_gaussian_key {
+    double direction[3], offset;
+} trip_gaussian_key;
+
+/* Leaves out bricks that lie behind a plane: no centre c of the brick has
+ * normal * c + offset + reach * radius >= 0. The radius is TRIP_GAUSSIAN_REACH times the largest
+ * deviation of the brick. */
+typedef struct trip_gaussian_plane {
+    double normal[3], offset, reach;
+} trip_gaussian_plane;
+
+enum { TRIP_GAUSSIAN_SIDES = 4, TRIP_GAUSSIAN_PLANES_MAX = 16 };
+
+/* Zero means the default. */
+typedef struct trip_gaussian_stream_params {
+    int axis; /* of the list that is read: 0, 1, 2 */
+    trip_gaussian_key key;
+    /* Splats with other keys are left out. Both 0 means all keys. */
+    double key_min, key_max;
+    const trip_gaussian_plane *planes; /* at most TRIP_GAUSSIAN_PLANES_MAX */
+    unsigned plane_count;
+    int degree; /* of the spherical harmonics to read; above the scene's means the scene's */
+} trip_gaussian_stream_params;
+
+/* A view for trip_gaussian_view_planes(). right, down and forward have unit length and are
+ * orthogonal. */
+typedef struct trip_gaussian_view {
+    double eye[3], right[3], down[3], forward[3];
+    bool parallel;
+    /* Half the picture's width and height: tangents of angles in perspective, lengths in parallel
+     * projection. */
+    double half_width, half_height;
+    unsigned width_px, height_px;
+} trip_gaussian_view;
+
+/* Sets the planes of the four sides of a view. They keep all splats that reach into the picture,
+ * with the Jacobian clamped at 1.3 times the tangents and 0.3 square pixels added. */
+void trip_gaussian_view_planes(const trip_gaussian_view *view,
+                               trip_gaussian_plane planes[TRIP_GAUSSIAN_SIDES]);
+
+/* Returns the key of a centre, exactly as the stream computes it. */
+double trip_gaussian_key_of(const trip_gaussian_key *key, const double centre[3]);
+
+/* The size of a stream, from the index alone. */
+typedef struct trip_gaussian_plan {
+    uint64_t bricks, records; /* that will be read */
+    uint64_t window_records;  /* greatest number of splats in the window */
+    uint64_t bytes;           /* of memory that the stream takes from its budget */
+    uint64_t read_bytes;      /* from the disk */
+} trip_gaussian_plan;
+
+/* Sets *plan. Takes 24 bytes a brick from the budget meanwhile. */
+int trip_gaussian_stream_plan(const trip_gaussian_set *set,
+                              const trip_gaussian_stream_params *params, trip_budget *budget,
+                              trip_gaussian_plan *plan);
+
+/* Fails before it reads anything if the budget is too small. The set must outlive the stream. */
+int trip_gaussian_stream_open(trip_gaussian_stream **out, const trip_gaussian_set *set,
+                              const trip_gaussian_stream_params *params, trip_budget *budget);
+/* Writes the next splats, and their keys unless `keys` is NULL. Sets *got to their number; 0 means
+ * the end. */
+int trip_gaussian_stream_next(trip_gaussian_stream *s, trip_gaussian *out, double *keys,
+                              size_t room, size_t *got);
+const trip_gaussian_plan *trip_gaussian_stream_planned(const trip_gaussian_stream *s);
+void trip_gaussian_stream_close(trip_gaussian_stream *s);
+
+#endif

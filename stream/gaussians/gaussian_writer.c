@@ -1,0 +1,227 @@
+#include "gaussian_writer.h"
+
+#include "dataset.h"
+#include "folder.h"
+#include "gaussian_code.h"
+#include "gaussian_set.h"
+#include "output.h"
+#include "report.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <xxhash.h>
+
+enum { BUFFER_BYTES = 1 << 16, BRICKS_BUFFER_BYTES = 1 << 14 };
+
+struct trip_gaussian_writer {
+    trip_budget *budget;
+    trip_folder folder;
+    trip_file_gaussian_header header;
+    const char *text;
+    int axis; /* of the open outputs; -1 before the first */
+    trip_output planes[TRIP_GAUSSIAN_PLANES];
+    trip_output bricks; /* unnamed, of all lists */
+    uint64_t records[3];
+    unsigned char *codes; /* a brick in all planes */
+    size_t codes_bytes;
+};
+
+/* Returns the bytes of a record in all planes. */
+static size_t record_bytes(int degree)
+{
+    size_t bytes = 0;
+    for (int n = 0; n <= degree; n++)
+        bytes += trip_gaussian_plane_bytes((unsigned)n);
+    return bytes;
+}
+
+static int begin(trip_gaussian_writer *w, const trip_gaussian_writer_params *params)
+{
+    int status = trip_folder_begin(&w->folder, params->path, params->replace);
+    if (status < 0)
+        return status;
+    w->codes_bytes = TRIP_GAUSSIAN_BRICK_RECORDS_MAX * record_bytes(params->degree);
+    w->codes = trip_budget_take(w->budget, w->codes_bytes);
+    if (!w->codes)
+        return trip_fail(TRIP_ERROR, "brick", params->path,
+                         "no memory for a brick of %zu bytes; raise --memory", w->codes_bytes);
+    return trip_output_create(&w->bricks,
+                              &(trip_output_params){ .folder = w->folder.partial,
+                                                     .name = TRIP_SPOOL_NAME,
+                                                     .buffer_bytes = BRICKS_BUFFER_BYTES,
+                                                     .unnamed = true },
+                              w->budget);
+}
+
+int trip_gaussian_writer_open(trip_gaussian_writer **out, const trip_gaussian_writer_params *params,
+                              trip_budget *budget)
+{
+    trip_gaussian_writer *w = *out = calloc(1, sizeof *w);
+    if (!w)
+        return trip_fail(TRIP_ERROR, "brick", params->path, "out of memory");
+    trip_file_gaussian_header *h = &w->header;
+    w->budget = budget;
+    w->folder.fd = -1;
+    w->axis = -1;
+    w->text = params->text ? params->text : "{}";
+    h->degree = (uint32_t)params->degree;
+    h->flags = params->flags;
+    for (int a = 0; a < 3; a++) {
+        h->centre_lo[a] = h->reach_lo[a] = INFINITY;
+        h->centre_hi[a] = h->reach_hi[a] = -INFINITY;
+    }
+    const int status = begin(w, params);
+    if (status < 0) {
+        trip_gaussian_writer_close(w);
+        *out = NULL;
+    }
+    return status;
+}
+
+const char *trip_gaussian_writer_folder(const trip_gaussian_writer *w)
+{
+    return w->folder.partial;
+}
+
+static int finish_planes(trip_gaussian_writer *w)
+{
+    int status = TRIP_OK;
+    for (unsigned n = 0; n <= w->header.degree; n++) {
+        trip_output *o = &w->planes[n];
+        if (status == TRIP_OK && w->axis >= 0)
+            status = trip_output_flush(o);
+        if (status == TRIP_OK && w->axis >= 0)
+            status = trip_output_sync(o);
+        trip_output_close(o);
+    }
+    return status;
+}
+
+static int open_planes(trip_gaussian_writer *w, int axis)
+{
+    char name[32];
+    int status = finish_planes(w);
+    w->axis = axis;
+    for (unsigned n = 0; n <= w->header.degree && status == TRIP_OK; n++)
+        status = trip_output_create(
+            &w->planes[n],
+            &(trip_output_params){ .folder = w->folder.partial,
+                                   .name = trip_gaussian_plane_name(axis, n, name),
+                                   .buffer_bytes = BUFFER_BYTES },
+            w->budget);
+    return status;
+}
+
+static void include(trip_file_gaussian_header *h, const trip_file_gaussian_brick *b)
+{
+    for (int a = 0; a < 3; a++) {
+        h->centre_lo[a] = fmin(h->centre_lo[a], b->centre_lo[a]);
+        h->centre_hi[a] = fmax(h->centre_hi[a], b->centre_hi[a]);
+        h->reach_lo[a] = fmin(h->reach_lo[a], b->reach_lo[a]);
+        h->reach_hi[a] = fmax(h->reach_hi[a], b->reach_hi[a]);
+    }
+}
+
+int trip_gaussian_writer_append(trip_gaussian_writer *w, int axis, int size_class,
+                                const unsigned char *const *splats, unsigned count)
+{
+    unsigned char *planes[TRIP_GAUSSIAN_PLANES] = { w->codes };
+    trip_file_gaussian_brick b = { .first_record = w->records[axis], .size_class = size_class };
+    int status = axis == w->axis ? TRIP_OK : open_planes(w, axis);
+    for (unsigned n = 1; n <= w->header.degree; n++)
+        planes[n] = planes[n - 1] +
+                    (size_t)TRIP_GAUSSIAN_BRICK_RECORDS_MAX * trip_gaussian_plane_bytes(n - 1);
+    trip_gaussian_encode(&b, splats, count, (int)w->header.degree, planes);
+    for (unsigned n = 0; n <= w->header.degree && status == TRIP_OK; n++)
+        status = trip_output_append(&w->planes[n], planes[n],
+                                    count * (size_t)trip_gaussian_plane_bytes(n));
+    include(&w->header, &b);
+    w->records[axis] += count;
+    w->header.brick_count[axis]++;
+    return status == TRIP_OK ? trip_output_append(&w->bricks, &b, sizeof b) : status;
+}
+
+static int append_index(trip_gaussian_writer *w, trip_output *index)
+{
+    trip_file_gaussian_header *h = &w->header;
+    unsigned char piece[4096];
+    XXH64_state_t *hash = XXH64_createState();
+    if (!hash)
+        return trip_fail(TRIP_ERROR, "brick", w->folder.path, "out of memory");
+    XXH64_reset(hash, 0);
+    int status = trip_output_flush(&w->bricks);
+    if (status == TRIP_OK)
+        status = trip_output_append(index, h, sizeof *h); /* replaced below */
+    for (uint64_t at = 0; at < w->bricks.bytes && status == TRIP_OK;) {
+        const uint64_t left = w->bricks.bytes - at;
+        const size_t bytes = left < sizeof piece ? (size_t)left : sizeof piece;
+        status = trip_output_read(&w->bricks, at, piece, bytes);
+        if (status == TRIP_OK)
+            status = trip_output_append(index, piece, bytes);
+        XXH64_update(hash, piece, bytes);
+        at += bytes;
+    }
+    if (status == TRIP_OK)
+        status = trip_output_append(index, w->text, h->text_bytes);
+    XXH64_update(hash, w->text, h->text_bytes);
+    h->tables_checksum = XXH64_digest(hash);
+    XXH64_freeState(hash);
+    h->header_checksum = XXH64(h, sizeof *h, 0);
+    if (status == TRIP_OK)
+        status = trip_output_flush(index);
+    if (status == TRIP_OK)
+        status = trip_output_patch(index, 0, h, sizeof *h);
+    return status == TRIP_OK ? trip_output_sync(index) : status;
+}
+
+static void complete_header(trip_gaussian_writer *w, const double lo[3], const double hi[3])
+{
+    trip_file_gaussian_header *h = &w->header;
+    uint64_t at = TRIP_GAUSSIAN_HEADER_BYTES;
+    memcpy(h->magic, TRIP_GAUSSIAN_MAGIC, sizeof h->magic);
+    h->version = TRIP_GAUSSIAN_VERSION;
+    h->header_bytes = TRIP_GAUSSIAN_HEADER_BYTES;
+    h->records = w->records[0];
+    for (int a = 0; a < 3; a++) {
+        h->bricks_offset[a] = at;
+        at += h->brick_count[a] * sizeof(trip_file_gaussian_brick);
+        h->typical_lo[a] = fmin(fmax(lo[a], h->centre_lo[a]), h->centre_hi[a]);
+        h->typical_hi[a] = fmax(fmin(hi[a], h->centre_hi[a]), h->typical_lo[a]);
+    }
+    h->text_offset = at;
+    h->text_bytes = strlen(w->text);
+    h->index_bytes = at + h->text_bytes;
+}
+
+int trip_gaussian_writer_finish(trip_gaussian_writer *w, const double typical_lo[3],
+                                const double typical_hi[3])
+{
+    trip_output index = { .fd = -1 };
+    complete_header(w, typical_lo, typical_hi);
+    int status = finish_planes(w);
+    if (status == TRIP_OK)
+        status = trip_output_create(&index,
+                                    &(trip_output_params){ .folder = w->folder.partial,
+                                                           .name = TRIP_INDEX_NAME,
+                                                           .buffer_bytes = BRICKS_BUFFER_BYTES },
+                                    w->budget);
+    if (status < 0)
+        return status;
+    status = append_index(w, &index);
+    trip_output_close(&index);
+    return status == TRIP_OK ? trip_folder_commit(&w->folder) : status;
+}
+
+void trip_gaussian_writer_close(trip_gaussian_writer *w)
+{
+    if (!w)
+        return;
+    for (unsigned n = 0; n < TRIP_GAUSSIAN_PLANES; n++)
+        trip_output_close(&w->planes[n]);
+    trip_output_close(&w->bricks);
+    if (w->codes)
+        trip_budget_release(w->budget, w->codes, w->codes_bytes);
+    trip_folder_close(&w->folder);
+    free(w);
+}

@@ -1,0 +1,35 @@
+/* Writes the data set of a Gaussian scene: bricks of the lists along X, Y and Z, in order, then the
+ * index. The folder gets its name only when all bytes are on the disk. One thread. */
+#ifndef TRIP_GAUSSIAN_WRITER_H
+#define TRIP_GAUSSIAN_WRITER_H
+
+#include <stdbool.h>
+
+#include "budget.h"
+#include "gaussian_format.h"
+
+typedef struct trip_gaussian_writer trip_gaussian_writer;
+
+typedef struct trip_gaussian_writer_params {
+    const char *path;
+    bool replace; /* replaces an existing data set, of any kind */
+    int degree;
+    uint32_t flags;   /* trip_gaussian_flag */
+    const char *text; /* JSON; NULL means "{}" */
+} trip_gaussian_writer_params;
+
+int trip_gaussian_writer_open(trip_gaussian_writer **out, const trip_gaussian_writer_params *params,
+                              trip_budget *budget);
+/* Returns the folder that is being written. Temporary files may lie there. */
+const char *trip_gaussian_writer_folder(const trip_gaussian_writer *w);
+/* Appends a brick to a list. Its records are in order; see trip_gaussian_encode(). Axes ascend from
+ * call to call. */
+int trip_gaussian_writer_append(trip_gaussian_writer *w, int axis, int size_class,
+                                const unsigned char *const *splats, unsigned count);
+/* Writes the index and gives the folder its name. `typical` bounds are those of the header. */
+int trip_gaussian_writer_finish(trip_gaussian_writer *w, const double typical_lo[3],
+                                const double typical_hi[3]);
+/* Removes the folder unless it is finished, and frees the writer. */
+void trip_gaussian_writer_close(trip_gaussian_writer *w);
+
+#endif

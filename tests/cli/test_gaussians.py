@@ -1,0 +1,370 @@
+"""Tests of Gaussian scenes: bricking, drawing, the cache, descriptions and refusals. The pictures are
+compared with tests/gaussians/definition.py, which has no code of the program."""
+import glob
+import json
+import math
+import os
+import shutil
+import signal
+import sys
+import time
+import unittest
+
+import numpy
+
+import program
+
+sys.path.insert(0, os.path.join(os.environ["TRIP_SOURCE_DIR"], "tests", "gaussians"))
+import definition  # noqa: E402
+
+FLAT = 1 / (2 * math.sqrt(math.pi))  # the harmonic of degree 0
+MEAN, MOST = 0.1, 2.0  # of 255
+
+
+def names_of(degree):
+    rest = 3 * ((degree + 1) ** 2 - 1)
+    return (["x", "y", "z", "f_dc_0", "f_dc_1", "f_dc_2"] + [f"f_rest_{i}" for i in range(rest)]
+            + ["opacity", "scale_0", "scale_1", "scale_2", "rot_0", "rot_1", "rot_2", "rot_3"])
+
+
+def write_scene(path, rows, degree=0):
+    """Writes a PLY as trainers do. A row has the columns of names_of(degree)."""
+    names = names_of(degree)
+    rows = numpy.asarray(rows, "<f4").reshape(-1, len(names))
+    lines = ["ply", "format binary_little_endian 1.0", f"element vertex {len(rows)}"]
+    lines += [f"property float {name}" for name in names] + ["end_header", ""]
+    program.write(path, "\n".join(lines).encode() + rows.tobytes())
+
+
+def row(centre, colour=(1, 0, 0), opacity=0.5, deviations=(0.1, 0.1, 0.1), turn=(1, 0, 0, 0)):
+    """Returns a row of degree 0. A colour is a display value."""
+    return [*centre, *((c - 0.5) / FLAT for c in colour), math.log(opacity / (1 - opacity)),
+            *numpy.log(deviations), *turn]
+
+
+def many(count, spread=1.0, seed=1, degree=0):
+    """Returns rows of Gaussians of all shapes and colours in a ball."""
+    r = numpy.random.default_rng(seed)
+    rest = 3 * ((degree + 1) ** 2 - 1)
+    return numpy.column_stack([
+        r.normal(0, spread / 2, (count, 3)), r.normal(0, 1, (count, 3)),
+        r.normal(0, 0.2, (count, rest)), r.normal(0, 1.5, count),
+        r.uniform(-4.5, -2.5, (count, 3)) + math.log(spread), r.normal(0, 1, (count, 4))])
+
+
+def options_of(view):
+    """Returns the options of a view of definition.py."""
+    out = ["--eye", ",".join(map(repr, map(float, view["eye"]))),
+           "--look", ",".join(map(repr, map(float, view["look"]))),
+           "--up", ",".join(map(repr, map(float, view["up"]))),
+           "--size", "{}x{}".format(*view["size"])]
+    if view.get("ortho_height"):
+        return [*out, "--ortho", repr(float(view["ortho_height"]))]
+    return [*out, "--fov", repr(float(view["fov"]))]
+
+
+def view_of(eye, look=(0, 0, 0), up=(0, -1, 0), size=(96, 64), fov=45, **more):
+    return {"eye": numpy.array(eye, float), "look": numpy.array(look, float),
+            "up": numpy.array(up, float), "size": size, "fov": fov, **more}
+
+
+class Gaussians(program.ProgramTest):
+    def scene(self, name, rows, degree=0):
+        """Writes and bricks a scene."""
+        write_scene(name + ".ply", rows, degree)
+        shutil.rmtree(name + ".trip", ignore_errors=True)
+        self.works("brick", name + ".ply", "-o", name + ".trip", "-q")
+        return name + ".trip"
+
+    def apart(self, data_set, ply, view, *options):
+        """Returns the mean and the largest difference from the definition, in 1/255."""
+        expected = definition.draw(definition.read_ply(ply), view)
+        self.assertGreater(expected[:, :, 3].mean(), 0.005)
+        picture = self.picture(data_set, *options_of(view), *options)
+        apart = 255 * numpy.abs(picture - expected)
+        return apart.mean(), apart.max()
+
+    def expect_definition(self, data_set, ply, view, mean=MEAN, most=MOST):
+        for renderer in "cpu", "reference":
+            found = self.apart(data_set, ply, view, "--renderer", renderer)
+            self.assertLess(found[0], mean, (renderer, view))
+            self.assertLess(found[1], most, (renderer, view))
+
+    # ---- pictures ----
+
+    def test_the_given_scenes_are_drawn_by_their_definition(self):
+        """The data set rounds its numbers, and the bounds are the same as without rounding."""
+        for name in "donut_slice", "train-1000":
+            ply = os.path.join(program.DATASETS, name + ".ply")
+            self.works("brick", ply, "-o", name + ".trip", "-q", "--force")
+            scene = definition.read_ply(ply)
+            lo, hi = numpy.percentile(scene["centre"], [2, 98], axis=0)
+            middle, radius = (lo + hi) / 2, max(numpy.linalg.norm(hi - lo) / 2, 0.2)
+            for turn in 0.4, 2.5, 4.6:
+                away = numpy.array([math.cos(turn), -0.3, math.sin(turn)])
+                view = view_of(middle + 2.2 * radius * away, middle, size=(120, 80))
+                self.expect_definition(name + ".trip", ply, view)
+
+    def test_a_generated_scene_with_harmonics_is_drawn_by_its_definition(self):
+        data = self.scene("many", many(3000, degree=3), 3)
+        self.expect_definition(data, "many.ply", view_of((1.5, -1, 3)))
+
+    def test_a_parallel_view_is_drawn_by_its_definition(self):
+        data = self.scene("parallel", many(2000))
+        view = view_of((1.5, -1, 3), ortho_height=2.5)
+        self.expect_definition(data, "parallel.ply", view)
+
+    def test_a_view_from_inside_is_drawn_by_its_definition(self):
+        data = self.scene("inside", many(4000, spread=4))
+        self.expect_definition(data, "inside.ply", view_of((0.1, 0.2, 0.1), (1, 0.1, 0.4), fov=80))
+
+    def test_each_degree_is_the_scene_without_the_higher_coefficients(self):
+        rows = many(1500, degree=3)
+        data = self.scene("degrees", rows, 3)
+        view = view_of((1.5, -1, 3))
+        for degree in range(4):
+            cut = numpy.array(rows)
+            names = names_of(3)
+            for channel in range(3):
+                for i in range((degree + 1) ** 2 - 1, 15):
+                    cut[:, names.index(f"f_rest_{15 * channel + i}")] = 0
+            write_scene("cut.ply", cut, 3)
+            mean, most = self.apart(data, "cut.ply", view, "--sh", degree)
+            self.assertLess(mean, MEAN, degree)
+            self.assertLess(most, MOST, degree)
+
+    def test_lists_draw_one_gaussian_as_depth_does(self):
+        data = self.scene("one", [row((0, 0, 0), (0.9, 0.4, 0.1), 0.8, (0.3, 0.1, 0.2))])
+        for view in view_of((1, -0.8, 3)), view_of((1, -0.8, 3), ortho_height=2):
+            depth = self.picture(data, *options_of(view))
+            lists = self.picture(data, *options_of(view), "--order", "lists")
+            self.assertGreater(depth[:, :, 3].max(), 0.7)
+            self.assertLess(255 * numpy.abs(depth - lists).max(), 0.01)
+
+    def test_lists_draw_gaussians_of_one_direction_in_their_order(self):
+        """Along z, the list of z has all of the weight at the middle pixel."""
+        data = self.scene("row", [row((0, 0, 0), (1, 0, 0), 0.6), row((0, 0, 1), (0, 1, 0), 0.6),
+                                  row((0, 0, -1), (0, 0, 1), 0.6)])
+        view = view_of((0, 0, 4), size=(33, 33), up=(0, 1, 0))
+        picture = self.picture(data, *options_of(view), "--order", "lists")
+        numpy.testing.assert_allclose(picture[16, 16, :3], [0.24, 0.6, 0.096], atol=0.01)
+
+    def test_cpu_and_reference_agree_in_both_orders(self):
+        data = self.scene("both", many(3000, degree=1), 1)
+        for order in "depth", "lists":
+            one, two = (self.picture(data, *options_of(view_of((1.5, -1, 3))), "--order", order,
+                                     "--renderer", renderer) for renderer in ("cpu", "reference"))
+            self.assertLess(255 * numpy.abs(one - two).max(), 1, order)
+
+    def test_far_coordinates_give_the_same_picture(self):
+        """The shift is a sum of powers of two, so that the floats of the file hold it exactly."""
+        rows = numpy.array(many(2000))
+        rows[:, :3] = numpy.round(rows[:, :3] * 2) / 2  # steps that floats have near 4 million
+        shift = numpy.array([500000, 4000000, 64])
+        near = self.scene("near", rows)
+        moved = rows.copy()
+        moved[:, :3] += shift
+        far = self.scene("far", moved)
+        view = view_of((2.3, -1.7, 5.1))
+        there = view_of(view["eye"] + shift, shift)
+        for options in (), ("--order", "lists"), ("--renderer", "reference"):
+            a = self.picture(near, *options_of(view), *options)
+            b = self.picture(far, *options_of(there), *options)
+            self.assertGreater(a[:, :, 3].mean(), 0.05)
+            self.assertLess(255 * numpy.abs(a - b).max(), 1, options)
+
+    def test_stray_gaussians_spoil_neither_the_view_nor_the_picture(self):
+        strays = [row((2e7, 0, 0)), row((0, -2e7, 1)), row((-2e7, 2e7, -2e7))]
+        stray = self.scene("stray", numpy.vstack([many(2000), strays]))
+        self.expect_definition(stray, "stray.ply", view_of((1.5, -1, 3)))
+        default = self.picture(stray, "--size", "64")
+        self.assertGreater(default[:, :, 3].mean(), 0.1)
+
+    def test_the_default_view_of_one_gaussian_shows_all_of_it(self):
+        data = self.scene("alone", [row((5, 5, 5), opacity=0.9)])
+        seen = self.picture(data, "--size", "64")[:, :, 3]
+        self.assertGreater(seen.max(), 0.88)
+        self.assertLess(max(seen[0].max(), seen[-1].max(), seen[:, 0].max(), seen[:, -1].max()), 0.01)
+
+    def test_a_camera_path_moves_through_a_scene(self):
+        data = self.scene("path", many(500))
+        keys = [{"seconds": t, "eye": [x, 0, 4], "look": [0, 0, 0], "up": [0, -1, 0], "fov": 40}
+                for t, x in ((0, -1), (1, 1))]
+        program.write("path.json", json.dumps({"triptych_path": 1, "frames_per_second": 2, "keys": keys}).encode())
+        self.works("render", data, "--size", "40", "--path", "path.json", "-o", "f.exr")
+        for frame, x in ("f-000.exr", -1), ("f-002.exr", 1):
+            alone = self.picture(data, *options_of(view_of((x, 0, 4), size=(40, 40), fov=40)))
+            numpy.testing.assert_allclose(program.read_exr(frame), alone, atol=1e-3)
+
+    def test_the_background_lies_behind_and_normalise_removes_the_transmittance(self):
+        data = self.scene("red", [row((0, 0, 0), (1, 0, 0), 0.5, (3, 3, 3))])
+        view = options_of(view_of((0, 0, 4), size=(9, 9), fov=10))
+        plain = self.picture(data, *view)
+        numpy.testing.assert_allclose(plain[4, 4], [0.5, 0, 0, 0.5], atol=0.005)
+        blue = self.picture(data, *view, "--background", "0,0,1")
+        numpy.testing.assert_allclose(blue[4, 4], [0.5, 0, 0.5, 1], atol=0.005)
+        whole = self.picture(data, *view, "--normalise")
+        numpy.testing.assert_allclose(whole[4, 4], [1, 0, 0, 1], atol=0.005)
+
+    def test_a_clip_box_removes_the_centres_outside(self):
+        data = self.scene("two", [row((-0.5, 0, 0), (1, 0, 0)), row((0.5, 0, 0), (0, 1, 0))])
+        left = self.scene("left", [row((-0.5, 0, 0), (1, 0, 0))])
+        view = options_of(view_of((0, 0, 4), up=(0, 1, 0)))
+        for order in "depth", "lists":
+            cut = self.picture(data, *view, "--order", order, "--clip-box", "-1,-1,-1,0,1,1")
+            one = self.picture(left, *view, "--order", order)
+            self.assertGreater(one[:, :, 3].max(), 0.4)
+            self.assertLess(255 * numpy.abs(cut - one).max(), 1, order)
+
+    # ---- runs ----
+
+    def test_threads_and_memory_change_no_bit(self):
+        data = self.scene("bits", many(20000))
+        for order in "depth", "lists":
+            pictures = [self.picture(data, "--size", "150x130", "--order", order, *o)
+                        for o in ((), ("--threads", "1"), ("--threads", "5"), ("--memory", "60M"))]
+            for other in pictures[1:]:
+                self.assertTrue((pictures[0] == other).all(), order)
+
+    def test_two_runs_of_brick_give_the_same_bytes(self):
+        write_scene("twice.ply", many(5000))
+        files = []
+        for name in "a.trip", "b.trip":
+            shutil.rmtree(name, ignore_errors=True)
+            self.works("brick", "twice.ply", "-o", name, "-q")
+            files.append({})
+            for path in sorted(glob.glob(name + "/*")):
+                with open(path, "rb") as file:
+                    files[-1][os.path.basename(path)] = file.read()
+        self.assertGreater(len(files[0]), 1)
+        self.assertEqual(*files)
+
+    def test_a_turntable_has_the_pictures_of_single_views(self):
+        data = self.scene("turn", many(1000))
+        self.works("render", data, "--size", "40", "--orbit", "3", "-o", "o.exr",
+                   program=program.QUICK_PROGRAM)
+        pictures = [program.read_exr(f"o-{i:03}.exr") for i in range(3)]
+        run = self.works("render", data, "--size", "40", "--orbit", "3", "-o", "p.exr",
+                         "--stats", "-")
+        for i, frame in enumerate(json.loads(run.stdout)["frames"]):
+            alone = self.picture(data, *frame["camera"].split())
+            numpy.testing.assert_allclose(pictures[i], alone, atol=1e-4)
+            self.assertTrue((pictures[i] == program.read_exr(f"p-{i:03}.exr")).all())
+        for a, b in (0, 1), (1, 2), (0, 2):
+            self.assertGreater(numpy.abs(pictures[a] - pictures[b]).max(), 0.1)
+
+    def test_the_statistics_count_the_gaussians(self):
+        data = self.scene("stats", many(1000))
+        stats = self.stats(data, "--size", "40", "--order", "lists")
+        self.assertEqual((stats["order"], stats["kernel"]), ("lists", "projected"))
+        self.assertEqual(stats["frames"][0]["gaussians"] % 1000, 0)
+        self.assertEqual(self.stats(data, "--size", "40", "--kernel", "ewa")["kernel"], "ewa")
+
+    def test_memory_stays_within_its_bound(self):
+        write_scene("million.ply", many(1000000, spread=10))
+        run = self.works("brick", "million.ply", "-o", "million.trip", "--memory", "64M", "--json",
+                         timeout=300)
+        os.remove("million.ply")
+        program_itself = 32 << 20
+        if not program.SANITIZED:
+            self.assertLess(json.loads(run.stdout)["peak_rss_bytes"], (64 << 20) + program_itself)
+        for order in "depth", "lists":
+            stats = self.stats("million.trip", "--size", "128", "--order", order, "--memory", "64M")
+            self.assertLessEqual(stats["memory_peak_bytes"], 64 << 20, order)
+            if not program.SANITIZED:
+                self.assertLess(stats["peak_rss_bytes"], (64 << 20) + program_itself, order)
+        self.fails(1, "render", "million.trip", "--size", "128", "-o", "a.png", "--memory", "4M",
+                   says="raise --memory")
+        shutil.rmtree("million.trip")
+
+    def test_ctrl_c_ends_a_run_soon_and_leaves_nothing(self):
+        write_scene("long.ply", many(400000, spread=10))
+        for command in ("brick", "long.ply", "-o", "long.trip"), \
+                       ("render", "long.ply", "--samples", "8", "-o", "long.png"):
+            run = program.start(*command)
+            program.await_handler(run)
+            time.sleep(0.1)
+            sent = time.monotonic()
+            run.send_signal(signal.SIGINT)
+            _, err = run.communicate(timeout=30)
+            if not program.SANITIZED:
+                self.assertLess(time.monotonic() - sent, 1, command)
+            self.assertEqual(run.returncode, 1, (command, err))
+            self.assertIn(b"interrupted", err)
+            self.assertEqual([n for n in os.listdir(".") if n.startswith("long")], ["long.ply"])
+        os.remove("long.ply")
+
+    # ---- files ----
+
+    def test_a_scene_file_is_bricked_once_into_the_cache(self):
+        write_scene("cached.ply", many(500))
+        first = self.works("render", "cached.ply", "-o", "a.exr", "--size", "40")
+        self.assertIn(b"bricked into the cache", first.stdout)
+        one = program.read_exr("a.exr")
+        shutil.copy("cached.ply", "copy.ply")
+        for name in "cached.ply", "copy.ply":
+            again = self.works("render", name, "-o", "a.exr", "--size", "40")
+            self.assertNotIn(b"bricked into the cache", again.stdout)
+            self.assertTrue((one == program.read_exr("a.exr")).all())
+        listed = self.works("cache", "list").stdout
+        self.assertIn(b"1 data set", listed)
+        write_scene("cached.ply", many(500, seed=2))
+        changed = self.works("render", "cached.ply", "-o", "a.exr", "--size", "40")
+        self.assertIn(b"bricked into the cache", changed.stdout)
+        self.assertFalse((one == program.read_exr("a.exr")).all())
+
+    def test_info_describes_the_data_set(self):
+        rows = many(700, degree=2)
+        data = self.scene("info", rows, 2)
+        info = self.info(data)
+        self.assertEqual((info["gaussians"], info["degree"]), (700, 2))
+        lo, hi = numpy.float32(rows[:, :3]).min(0), numpy.float32(rows[:, :3]).max(0)
+        numpy.testing.assert_allclose(info["bounds"], [lo, hi], atol=1e-5)
+        self.assertEqual(info["source"]["input"], "info.ply")
+        self.assertEqual(info["bytes"], sum(os.path.getsize(f) for f in glob.glob(data + "/*")))
+        text = self.works("info", "--verify", data).stdout.decode()
+        self.assertIn("triptych render info.trip -o NAME.png", text)
+        self.assertIn("every page and record is intact", text)
+
+    def test_verify_finds_a_changed_byte(self):
+        data = self.scene("damaged", many(2000))
+        path = max(glob.glob(data + "/*"), key=os.path.getsize)
+        with open(path, "r+b") as file:
+            file.seek(os.path.getsize(path) // 3)
+            byte = file.read(1)
+            file.seek(-1, os.SEEK_CUR)
+            file.write(bytes([byte[0] ^ 1]))
+        self.fails(1, "info", "--verify", data)
+
+    # ---- refusals ----
+
+    def test_commands_for_volumes_refuse_scenes(self):
+        data = self.scene("refused", [row((0, 0, 0))])
+        for name in data, "refused.ply":
+            for command in ("view", name), ("serve", name), ("accuracy", name, "-o", "r"), \
+                           ("bench", "stream", name):
+                self.leaves_nothing(2, *command,
+                                    says=f"{name}: is a Gaussian scene; `triptych render` draws it")
+        self.fails(2, "render", data, data, "-o", "a.png", says="give one scene at a time")
+        self.fails(2, "tf", "show", data, says="is a Gaussian scene")
+        self.leaves_nothing(2, "brick", data, "-o", "b.trip", says="is a data set already")
+
+    def test_settings_of_volumes_are_refused_for_scenes(self):
+        data = self.scene("settings", [row((0, 0, 0))])
+        for options in ("--lod", "1"), ("--interpolation", "cubic"), ("--compositing", "sheet"), \
+                       ("--error", "1"), ("--kernel", "fixed"), ("--tf", "bone"), \
+                       ("--effects", "shadows"), ("--renderer", "gl"), ("--renderer", "integral"):
+            self.leaves_nothing(2, "render", data, "-o", "a.png", *options)
+        self.leaves_nothing(2, "render", "settings.ply", "-o", "a.png", "--spacing", "1,1,1",
+                            says="does not apply to Gaussian scenes")
+
+    def test_settings_of_scenes_are_refused_for_volumes(self):
+        tooth = os.path.join(program.DATASETS, "tooth.nhdr")
+        for options in ("--order", "lists"), ("--order", "depth"), ("--sh", "0"):
+            run = self.leaves_nothing(2, "render", tooth, "-o", "a.png", *options,
+                                      says="applies to Gaussian scenes only")
+            self.assertNotIn(b"bricked", run.stdout)
+
+
+if __name__ == "__main__":
+    program.main()
