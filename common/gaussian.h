@@ -1,6 +1,6 @@
 /* A Gaussian splat of a scene: an ellipsoid with a density that falls from its centre as
- * exp(-d^2 / 2), where d counts standard deviations. Its opacity is that of a ray through the
- * centre (Zwicker et al. 2001; Kerbl et al. 2023). A flat one has a deviation of 0: a surfel. */
+ * exp(-d^2 / 2), where d counts standard deviations. A ray through the centre has the opacity
+ * `opacity` (Zwicker et al. 2001; Kerbl et al. 2023). A flat one has a deviation of 0: a surfel. */
 #ifndef TRIP_GAUSSIAN_H
 #define TRIP_GAUSSIAN_H
 

@@ -488,7 +488,7 @@ static const trip_option rows[DRAW_OPTIONS] = {
     [DRAW_ORDER] = { "order", "depth|lists",
                      "Selects the order of the Gaussians of a scene: by the depth of their "
                      "centres, "
-                     "or by the three lists, which sorts nothing",
+                     "or by the three lists",
                      "depth", "Gaussian scenes only", .group = DRAW_GROUP_ACCURACY,
                      .measured = true, AT(scene.order), CHOICE(orders) },
     [DRAW_HARMONICS] = { "sh", "DEGREE",

@@ -251,9 +251,7 @@ void trip_context_explain_scene(const triptych *t, FILE *out)
     fprintf(out, "scene       %llu Gaussians, harmonics up to degree %d of %u\n",
             (unsigned long long)t->scene->header.records, settings.degree, t->scene->header.degree);
     if (lists)
-        fprintf(out,
-                "order       by lists: %u of 3 have weight in the picture; nothing is sorted\n",
-                s.layers);
+        fprintf(out, "order       by lists: %u of 3 have weight in the picture\n", s.layers);
     else
         fprintf(out, "order       by depth: at most %llu Gaussians wait in the window\n",
                 (unsigned long long)s.window_records);

@@ -575,8 +575,8 @@ typedef struct triptych_clip {
 typedef enum triptych_order {
     TRIPTYCH_ORDER_DEFAULT, /* depth */
     TRIPTYCH_ORDER_DEPTH,   /* by the depth of their centres, as scenes are trained */
-    /* By their coordinates along X, Y and Z. The layers of the three lists are blended. Nothing is
-     * sorted, and nothing pops when the view turns. */
+    /* By their coordinates along X, Y and Z. The layers of the three lists are blended. Fewer
+     * Gaussians change places when the view turns. */
     TRIPTYCH_ORDER_LISTS,
 } triptych_order;
 

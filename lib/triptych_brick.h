@@ -305,8 +305,8 @@ TRIPTYCH_API int triptych_is_gaussians(triptych *t, const char *path);
 /* Reads a Gaussian scene and describes it. */
 TRIPTYCH_API int triptych_describe_gaussians(triptych *t, const char *path,
                                              triptych_gaussians *out);
-/* Bricks a Gaussian scene. Of the options, only `replace` and `memory_bytes` apply. *out describes
- * the scene; NULL is allowed. */
+/* Bricks a Gaussian scene. Only the options `replace` and `memory_bytes` apply. *out gets the
+ * description of the scene; NULL is allowed. */
 TRIPTYCH_API int triptych_brick_gaussians(triptych *t, const char *path, const char *data_set,
                                           const triptych_brick_options *options,
                                           triptych_gaussians *out);

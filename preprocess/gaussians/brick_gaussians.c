@@ -36,7 +36,7 @@ typedef struct bricker {
     trip_gaussian_sample sample;
     size_t sample_bytes;
     double typical_lo[3], typical_hi[3];
-    /* Of the axis being written: */
+    /* These belong to the axis that is being written. */
     int axis;
     trip_gaussian_tree tree;
     uint64_t leaf;            /* of the gathered splats */

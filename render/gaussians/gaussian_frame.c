@@ -266,7 +266,7 @@ static int take_batch(trip_gaussian_frame *f, const trip_gaussian **batch, size_
             source *next = !has_any(b) || (has_any(a) && a->keys[a->at] <= b->keys[b->at]) ? a : b;
             f->batch[(*count)++] = next->batch[next->at++];
             if (!has_any(next))
-                break; /* its next one may come before those of the other source */
+                break; /* the next one of this source may come first */
         }
     }
     f->stats.read_ms += trip_now_ms() - begun;

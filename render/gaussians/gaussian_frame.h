@@ -1,8 +1,8 @@
 /* Draws one picture of a Gaussian scene, in steps: streams its Gaussians in the order of drawing,
  * composites them into layers, and merges the layers.
  *
- * - By depth there is one layer, in the order of the centres' view depth.
- * - By lists there is a layer for each axis that has weight in the picture. Its Gaussians come in
+ * - The order by depth has one layer. Its Gaussians come in the order of the centres' view depth.
+ * - The order by lists has a layer for each axis with weight in the picture. Its Gaussians come in
  *   the order of their coordinate along the axis, outwards from the eye. Layers are merged with
  *   w^2 (equation 3 of Hofsetz, Max & Bastos 2008; weight.h).
  *

@@ -93,7 +93,7 @@ INLINE vf linear_at(const linear *l, int i, float x, float y)
  *
  *     q = (u^2 + v^2) / (w^2 + a^2 + b^2)
  *
- * q is infinite where w <= 0. Only curved splats have w, a and b. */
+ * q is infinite where w <= 0. Splats that are not curved lack w, a and b. */
 typedef struct tile_splat {
     linear u, v, w, a, b;
     int left, right, top, bottom; /* blocks; empty if left > right or top > bottom */

@@ -26,7 +26,7 @@ const char *trip_gaussian_writer_folder(const trip_gaussian_writer *w);
  * call to call. */
 int trip_gaussian_writer_append(trip_gaussian_writer *w, int axis, int size_class,
                                 const unsigned char *const *splats, unsigned count);
-/* Writes the index and gives the folder its name. `typical` bounds are those of the header. */
+/* Writes the index and gives the folder its name. The header gets the `typical` bounds. */
 int trip_gaussian_writer_finish(trip_gaussian_writer *w, const double typical_lo[3],
                                 const double typical_hi[3]);
 /* Removes the folder unless it is finished, and frees the writer. */
