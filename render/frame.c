@@ -343,9 +343,10 @@ void trip_frame_await(trip_drawing *d, uint64_t timeout_ns)
 #ifndef NDEBUG
 /* Debug builds check every picture with it. Components must not be NaN, and distances must be
  * positive. */
-static bool is_of_numbers(const trip_camera *camera, const float *rgba, const float *depth)
+static bool is_of_numbers(const trip_frame *frame, const float *rgba, const float *depth)
 {
-    size_t pixels = (size_t)camera->width * (size_t)camera->height;
+    const int rows = frame->rows ? frame->rows : frame->camera->height;
+    size_t pixels = (size_t)frame->camera->width * (size_t)rows;
     for (size_t i = 0; i < 4 * pixels; i++)
         if (!isfinite(rgba[i]))
             return false;
@@ -363,7 +364,7 @@ int trip_frame_picture(trip_drawing *d, float *rgba, float *depth)
     int status = trip_frame_poll();
     if (!status)
         status = d->renderer->ops->picture(d->renderer, rgba, depth);
-    assert(status || is_of_numbers(d->frame->camera, rgba, depth));
+    assert(status || is_of_numbers(d->frame, rgba, depth));
     trip_scope_enter(before);
     if (status || !d->done)
         return status;
