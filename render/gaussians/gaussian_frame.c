@@ -340,9 +340,10 @@ int trip_gaussian_frame_step(trip_gaussian_frame *f, uint64_t deadline_ns)
 static void add_layer(const trip_gaussian_frame *f, const layer *l, float *rgba, float *depth)
 {
     const trip_camera *c = f->params.camera;
-    const float *from = f->picture, *distances = f->picture + 4 * pixels_of(f);
+    const float *from = f->picture;
+    size_t pixel = 0; /* distances stand behind the colours */
     for (int y = 0; y < c->height; y++)
-        for (int x = 0; x < c->width; x++, from += 4, rgba += 4, distances++) {
+        for (int x = 0; x < c->width; x++, from += 4, rgba += 4, pixel++) {
             const trip_vec3 ray = trip_camera_ray(c, x + 0.5, y + 0.5);
             double all = 0;
             for (int axis = 0; axis < LAYERS_MAX; axis++) {
@@ -354,8 +355,7 @@ static void add_layer(const trip_gaussian_frame *f, const layer *l, float *rgba,
             for (int i = 0; i < 4; i++)
                 rgba[i] += share * from[i];
             if (depth && share > 0 && from[3] > 0)
-                *depth += share * from[3] * *distances;
-            depth += depth != NULL;
+                depth[pixel] += share * from[3] * f->picture[4 * pixels_of(f) + pixel];
         }
 }
 
