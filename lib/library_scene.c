@@ -1,4 +1,5 @@
 /* Gaussian scenes: opening, views and frames (triptych.h). */
+#include <float.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -126,7 +127,8 @@ static trip_gaussian_settings settings_of(const triptych *t)
         .antialiased = t->scene->header.flags & TRIP_GAUSSIAN_ANTIALIASED,
         .shape = shape_of(g->splat.footprint),
         .opacity_scale = t->scene_opacity,
-        .early_termination = g->all.early_termination > 0 ? g->all.early_termination : 0,
+        .early_termination = g->all.early_termination == TRIPTYCH_ZERO ? DBL_MIN /* never */
+                                                                       : g->all.early_termination,
         .clip = trip_context_clip(t),
         .depth = g->all.depth,
     };
@@ -192,6 +194,7 @@ int trip_context_begin_scene(triptych *t)
 static triptych_frame_stats stats_of(const triptych *t)
 {
     const trip_gaussian_frame_stats s = trip_gaussian_frame_get_stats(t->scene_frame);
+    const trip_gaussian_settings settings = settings_of(t);
     const bool reference = t->resources.renderer == TRIPTYCH_RENDERER_REFERENCE;
     return (triptych_frame_stats){
         .ms = trip_now_ms() - t->begun_ms,
@@ -209,7 +212,7 @@ static triptych_frame_stats stats_of(const triptych *t)
         .ring = "not used: Gaussians come from windows",
         .classify = TRIPTYCH_CLASSIFY_PRE,
         .footprint = t->given.splat.footprint,
-        .early_termination = t->given.all.early_termination,
+        .early_termination = trip_gaussian_termination(&settings),
         .rays = t->drawn_settings.samples,
         .expected_error = -1,
     };

@@ -32,7 +32,7 @@ typedef struct trip_gaussian_frame_params {
 typedef struct trip_gaussian_frame_stats {
     uint64_t gaussians; /* drawn from the streams, over all layers */
     uint64_t bricks, bytes_read;
-    uint64_t window_records; /* the most that a window can hold */
+    uint64_t window_records; /* room in the largest window */
     unsigned layers;
     double draw_ms, read_ms, merge_ms;
 } trip_gaussian_frame_stats;

@@ -149,6 +149,17 @@ class Gaussians(program.ProgramTest):
         picture = self.picture(data, *options_of(view), "--order", "lists")
         numpy.testing.assert_allclose(picture[16, 16, :3], [0.24, 0.6, 0.096], atol=0.01)
 
+    def test_early_termination_ends_where_it_is_given(self):
+        """A Gaussian that would leave less transmittance than T is not added. Each has 0.99 at its
+        centre, so 1, 2 and 3 of them leave 1e-2, 1e-4 and 1e-6."""
+        data = self.scene("deep", [row((0, 0, z), (1, 1, 1), 0.99, (0.5, 0.5, 0.5)) for z in (-1, 0, 1)])
+        view = view_of((0, 0, 9), size=(33, 33), up=(0, 1, 0))
+        for renderer in "cpu", "reference":
+            for given, left in (0.05, 1), (1e-3, 1e-2), (0, 1e-6):
+                alpha = self.picture(data, *options_of(view), "--renderer", renderer,
+                                     "--early-termination", given)[16, 16, 3]
+                self.assertAlmostEqual(1 - alpha, left, delta=0.06 * left + 2e-7, msg=(renderer, given))
+
     def test_cpu_and_reference_agree_in_both_orders(self):
         data = self.scene("both", many(3000, degree=1), 1)
         for order in "depth", "lists":

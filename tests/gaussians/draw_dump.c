@@ -14,9 +14,9 @@
 #include <string.h>
 
 #include "clock.h"
-#include "cpu/pool.h"
 #include "gaussians_cpu.h"
 #include "gaussians_reference.h"
+#include "pool_runner.h"
 
 enum { HEADER = 18, NUMBERS = 59 };
 
@@ -30,27 +30,6 @@ typedef struct run {
     const char *isa;
     float *rgba, *depth;
 } run;
-
-typedef struct job {
-    void (*task)(void *context, unsigned number);
-    void *context;
-} job;
-
-static void run_one(void *context, unsigned task, unsigned thread)
-{
-    (void)thread;
-    const job *j = context;
-    j->task(j->context, task);
-}
-
-static void run_all(void *user, void (*task)(void *context, unsigned number), void *context,
-                    unsigned count)
-{
-    job j = { task, context };
-    trip_cpu_job pool_job = { .run = run_one, .context = &j, .tasks = count };
-    trip_cpu_pool_start(user, &pool_job);
-    trip_cpu_pool_wait(user, &pool_job);
-}
 
 static void die(const char *what)
 {

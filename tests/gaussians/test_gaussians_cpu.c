@@ -1,33 +1,12 @@
 /* The CPU renderer of Gaussian scenes: closed forms, the same bits in all circumstances, and the
  * reference renderer. */
 #include "cpu/kernels/isa.h"
-#include "cpu/pool.h"
 #include "gaussians_cpu.h"
 #include "gaussians_reference.h"
+#include "pool_runner.h"
 #include "test.h"
 
 enum { WIDTH = 150, HEIGHT = 90, PIXELS = WIDTH * HEIGHT, SCENE = 3000 };
-
-typedef struct job {
-    void (*task)(void *context, unsigned number);
-    void *context;
-} job;
-
-static void run_one(void *context, unsigned task, unsigned thread)
-{
-    (void)thread;
-    const job *j = context;
-    j->task(j->context, task);
-}
-
-static void run_all(void *user, void (*task)(void *context, unsigned number), void *context,
-                    unsigned count)
-{
-    job j = { task, context };
-    trip_cpu_job pool_job = { .run = run_one, .context = &j, .tasks = count };
-    trip_cpu_pool_start(user, &pool_job);
-    trip_cpu_pool_wait(user, &pool_job);
-}
 
 /* Looks along z from the origin. */
 static trip_camera camera_of(double ortho_height)
