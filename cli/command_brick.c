@@ -320,13 +320,7 @@ static void add_number(cJSON *object, const char *name, double value)
 
 static int print_object(cJSON *root, const options *o)
 {
-    char *text = trip_json_print(root, true);
-    cJSON_Delete(root);
-    if (!text)
-        return trip_fail(TRIP_ERROR, "brick", o->output, "out of memory");
-    puts(text);
-    free(text);
-    return 0;
+    return trip_json_put(root, "brick", o->output);
 }
 
 static int print_json(const options *o, const triptych_brick_summary *s, const brick_limits *limits)

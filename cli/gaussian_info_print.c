@@ -34,13 +34,7 @@ static int print_json(const triptych_gaussians *g, const char *path)
     cJSON *corners = cJSON_AddArrayToObject(root, "bounds");
     add_corner(corners, g->lo);
     add_corner(corners, g->hi);
-    char *text = trip_json_print(root, true);
-    cJSON_Delete(root);
-    if (!text)
-        return trip_fail(TRIP_ERROR, "info", path, "out of memory");
-    puts(text);
-    free(text);
-    return 0;
+    return trip_json_put(root, "info", path);
 }
 
 static void print_text(const triptych_gaussians *g, const char *path)
@@ -108,13 +102,7 @@ static int print_scene_json(const triptych_scene *s, const cJSON *notes, const c
     if (verified)
         cJSON_AddTrueToObject(root, "verified");
     cJSON_AddItemToObject(root, "source", cJSON_Duplicate(notes, true));
-    char *text = trip_json_print(root, true);
-    cJSON_Delete(root);
-    if (!text)
-        return trip_fail(TRIP_ERROR, "info", path, "out of memory");
-    puts(text);
-    free(text);
-    return 0;
+    return trip_json_put(root, "info", path);
 }
 
 static void print_box(const char *label, const double lo[3], const double hi[3])

@@ -102,13 +102,7 @@ static int print_json(const triptych_description *d, const triptych_values *v, c
     if (fill)
         cJSON_AddStringToObject(root, "fill", fill);
     cJSON_AddItemReferenceToObject(root, "series", series);
-    char *text = trip_json_print(root, true);
-    cJSON_Delete(root);
-    if (!text)
-        return trip_fail(TRIP_ERROR, "info", path, "out of memory");
-    puts(text);
-    free(text);
-    return 0;
+    return trip_json_put(root, "info", path);
 }
 
 static void print_line(const char *label, const char *text)

@@ -99,3 +99,14 @@ char *trip_json_print(const struct cJSON *root, bool formatted)
     free(text);
     return NULL;
 }
+
+int trip_json_put(cJSON *root, const char *stage, const char *where)
+{
+    char *text = trip_json_print(root, true);
+    cJSON_Delete(root);
+    if (!text)
+        return trip_fail(TRIP_ERROR, stage, where, "out of memory");
+    puts(text);
+    free(text);
+    return 0;
+}

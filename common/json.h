@@ -28,5 +28,8 @@ void trip_json_free(trip_json *j);
 /* Returns the tree as text, for free(). The text is valid UTF-8 for any strings, with control
  * characters escaped. Returns NULL if memory is exhausted. */
 char *trip_json_print(const struct cJSON *root, bool formatted);
+/* Prints the tree to standard output and deletes it. Fails (reported for `stage` and `where`) if
+ * memory is exhausted. */
+int trip_json_put(struct cJSON *root, const char *stage, const char *where);
 
 #endif
