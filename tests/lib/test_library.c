@@ -18,6 +18,7 @@
 #include <cmocka.h>
 
 #include "contexts.h"
+#include "sanitizers.h"
 
 enum { SIZE = 96, FLOATS = 4 * SIZE * SIZE };
 
@@ -268,9 +269,10 @@ static void more_memory_never_draws_less(void **state)
 {
     static float rgba[FLOATS];
     draw_settings s = { .all.samples = 4 };
+    const uint64_t step = TEST_BY_TURNS ? 3000000 : 500000;
     int drawn = 0, refused = 0;
     (void)state;
-    for (uint64_t memory = 6 << 20; memory < 24 << 20; memory += 500000) {
+    for (uint64_t memory = 6 << 20; memory < 24 << 20; memory += step) {
         triptych *t = new_context();
         assert_int_equal(triptych_open(t, DATA_SET,
                                        &(triptych_resources){ .memory_bytes = memory,
@@ -1191,7 +1193,7 @@ static void a_light_of_the_view_turns_with_the_camera(void **state)
         draw_settings s = with_effects(n / 2 ? TRIPTYCH_EFFECT_SHADOWS : 0);
         triptych *t = new_context();
         open_data(t, renderers[n % 2]);
-        for (double degrees = 0; degrees < 250; degrees += 80) {
+        for (double degrees = 0; degrees < 250; degrees += TEST_BY_TURNS ? 160 : 80) {
             triptych_camera c;
             double axes[3][3], length[2] = { 0, 0 };
             const double light[3] = { 2, 1, 0.5 };
