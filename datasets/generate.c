@@ -1,5 +1,6 @@
-/* triptych-generate: writes a volume of any size with values from formulas. It holds only a few
- * slices or one cube at a time, so memory use does not grow with the volume. */
+/* triptych-generate: writes a volume of any size with values from formulas, or a Gaussian scene of
+ * any size (landscape.h). It holds only a few slices or one cube at a time, so memory use does not
+ * grow with the volume. */
 #include <argp.h>
 #include <errno.h>
 #include <pthread.h>
@@ -10,6 +11,7 @@
 
 #include "fields.h"
 #include "interrupt.h"
+#include "landscape.h"
 #include "new_file.h"
 #include "porous.h"
 #include "report.h"
@@ -19,6 +21,7 @@
 enum { ROWS_PER_TASK = 8, MAX_THREADS = 64, SLICES = 8, PIECE = 256 };
 
 #define POROUS "porous"
+#define LANDSCAPE "landscape"
 
 typedef enum sample_type { SAMPLE_U8, SAMPLE_U16, SAMPLE_F32, SAMPLE_DEFAULT } sample_type;
 
@@ -34,6 +37,9 @@ typedef struct job {
     sample_type type;
     double detail;
     long threads;
+    const char *scenes[TRIP_LANDSCAPE_SCENES_MAX]; /* of the landscape */
+    int scene_count;
+    uint64_t count; /* Gaussians of the landscape */
 } job;
 
 /* A part of the volume. Threads take its rows from `next`. */
@@ -195,8 +201,22 @@ static bool ends_with(const char *text, const char *end)
     return n > m && strcmp(text + n - m, end) == 0;
 }
 
+static bool is_landscape(const job *j)
+{
+    return strcmp(j->name, LANDSCAPE) == 0;
+}
+
+static int generate_landscape(const job *j)
+{
+    if (!ends_with(j->output, ".ply"))
+        return trip_fail(TRIP_USAGE, "generate", j->output, "the name must end in .ply");
+    return trip_landscape_write(j->output, j->scenes, j->scene_count, j->count);
+}
+
 static int generate(job *j)
 {
+    if (is_landscape(j))
+        return generate_landscape(j);
     trip_new_file file;
     bool sparse = ends_with(j->output, ".vdb"), header = ends_with(j->output, ".nrrd");
     if (!sparse && !header && !ends_with(j->output, ".raw"))
@@ -241,10 +261,42 @@ static int parse_type(const char *text, sample_type *type)
     return -1;
 }
 
+static void parse_argument(job *j, const char *arg, struct argp_state *state)
+{
+    if (state->arg_num == 0) {
+        j->name = arg;
+        j->field = trip_field_find(arg);
+        if (!j->field && strcmp(arg, POROUS) != 0 && !is_landscape(j))
+            argp_error(state,
+                       "unknown field '%s'; use marschner-lobb, cloud, shells, filaments, " POROUS
+                       " or " LANDSCAPE,
+                       arg);
+    } else if (!is_landscape(j)) {
+        argp_error(state, "'%s' is one argument too many; only " LANDSCAPE " takes files", arg);
+    } else if (j->scene_count == TRIP_LANDSCAPE_SCENES_MAX) {
+        argp_error(state, "a landscape has at most %d scenes", TRIP_LANDSCAPE_SCENES_MAX);
+    } else {
+        j->scenes[j->scene_count++] = arg;
+    }
+}
+
+static void check_together(const job *j, struct argp_state *state)
+{
+    if (!j->name || !j->output)
+        argp_error(state, "FIELD and -o FILE are required");
+    if (is_landscape(j) && (j->dims[0] || j->type != SAMPLE_DEFAULT || j->detail > 0 || j->threads))
+        argp_error(state, "--size, --type, --detail and --threads do not apply to " LANDSCAPE);
+    if (is_landscape(j) && !j->scene_count)
+        argp_error(state, LANDSCAPE " needs at least one SCENE");
+    if (!is_landscape(j) && j->count)
+        argp_error(state, "--count applies to " LANDSCAPE " only");
+}
+
 static error_t parse_option(int key, char *arg, struct argp_state *state)
 {
     job *j = state->input;
     char *end = NULL;
+    double count;
     switch (key) {
     case 'h':
         argp_state_help(state, stdout, ARGP_HELP_STD_HELP);
@@ -270,17 +322,16 @@ static error_t parse_option(int key, char *arg, struct argp_state *state)
             argp_error(state, "invalid value '%s' for --threads; use a number from 1 to %d", arg,
                        MAX_THREADS);
         return 0;
+    case 'n':
+        if (!trip_text_to_double(arg, &count) || !(count >= 1 && count <= 1e12))
+            argp_error(state, "invalid value '%s' for --count; use a number from 1 to 1e12", arg);
+        j->count = (uint64_t)count;
+        return 0;
     case ARGP_KEY_ARG:
-        j->name = state->arg_num == 0 ? arg : "";
-        j->field = trip_field_find(j->name);
-        if (!j->field && strcmp(j->name, POROUS) != 0)
-            argp_error(
-                state,
-                "unknown field '%s'; use marschner-lobb, cloud, shells, filaments or " POROUS, arg);
+        parse_argument(j, arg, state);
         return 0;
     case ARGP_KEY_END:
-        if (!j->name || !j->output)
-            argp_error(state, "FIELD and -o FILE are required");
+        check_together(j, state);
         return 0;
     default:
         return ARGP_ERR_UNKNOWN;
@@ -289,6 +340,7 @@ static error_t parse_option(int key, char *arg, struct argp_state *state)
 
 static const struct argp_option options[] = {
     { "output", 'o', "FILE", 0, "Writes this file: .nrrd, .raw or .vdb (sparse)", 0 },
+    { "count", 'n', "N", 0, "Sets the number of Gaussians of a landscape (default: 1000000)", 0 },
     { "size", 's', "N|NXxNYxNZ", 0,
       "Sets the number of voxels along each axis (default: 256; porous: 1024x1024x300)", 0 },
     { "type", 't', "TYPE", 0,
@@ -305,6 +357,11 @@ static const struct argp_option options[] = {
 
 static void choose_defaults(job *j)
 {
+    const long processors = sysconf(_SC_NPROCESSORS_ONLN);
+    if (j->threads == 0)
+        j->threads = processors < MAX_THREADS ? processors : MAX_THREADS;
+    if (j->count == 0)
+        j->count = 1000000;
     static const long scan[3] = { 1024, 1024, 300 };
     long longest = 0;
     for (int a = 0; a < 3; a++) {
@@ -320,17 +377,16 @@ static void choose_defaults(job *j)
 
 int main(int argc, char **argv)
 {
-    long processors = sysconf(_SC_NPROCESSORS_ONLN);
-    job j = { .type = SAMPLE_DEFAULT,
-              .threads = processors < MAX_THREADS ? processors : MAX_THREADS };
+    job j = { .type = SAMPLE_DEFAULT };
     struct argp argp = {
         options,
         parse_option,
-        "FIELD",
+        "FIELD\nlandscape SCENE...",
         "Writes a volume of a function in closed form. FIELD is marschner-lobb (dense), cloud "
         "(about half empty), shells or filaments (almost empty), or porous. porous is like a CT "
         "scan "
-        "of a porous solid: solid 32000, pores 12000, and noise with the standard deviation 900.",
+        "of a porous solid: solid 32000, pores 12000, and noise with the standard deviation 900.\n"
+        "landscape writes a PLY file of 3D Gaussians: copies of the SCENEs stand on hills.",
         NULL,
         NULL,
         NULL

@@ -77,6 +77,32 @@ def generate(field, dims, path, *arguments):
     )
 
 
+def read_ply(path):
+    """Returns the vertices of a binary PLY file of floats."""
+    with open(path, "rb") as f:
+        names = []
+        while (line := f.readline().strip()) != b"end_header":
+            if line.startswith(b"property"):
+                names.append((line.split()[2].decode(), "<f4"))
+        return numpy.frombuffer(f.read(), names)
+
+
+def centres(vertices):
+    return numpy.stack([vertices[n].astype(float) for n in "xyz"], axis=1)
+
+
+def logit(vertices):
+    """Returns the opacities as the generator writes them: limited to 1e-6 and its complement."""
+    o = numpy.float32(1) / (1 + numpy.exp(-vertices["opacity"].astype(float)))
+    o = numpy.clip(o.astype("f4").astype(float), 1e-6, 1 - 1e-6)
+    return numpy.log(o / (1 - o))
+
+
+def height(x, z):
+    """The height of the ground of a landscape (datasets/landscape.h)."""
+    return 0.8 * numpy.sin(0.35 * x + 0.6) * numpy.cos(0.27 * z) + 0.2 * numpy.sin(0.9 * z + 0.4 * x)
+
+
 def read_raw(path, dims, scalar):
     return numpy.fromfile(path, scalar).reshape(dims[::-1])
 
@@ -176,6 +202,67 @@ class Generate(program.ProgramTest):
                 with open(name, "rb") as f:  # a VDB file begins with a random identifier
                     contents.add(f.read()[64:])
             self.assertEqual(len(contents), 1, (field, name))
+
+    def test_a_landscape_has_similar_copies_on_its_ground(self):
+        """The copies are turned about y and scaled. The lowest ones touch the ground at the formula's
+        height, apart from the 2 % that may be strays."""
+        given = [os.path.join(program.DATASETS, name) for name in ("donut_slice.ply", "train-1000.ply")]
+        r = subprocess.run([program.GENERATE, "landscape", *given, "-n", "40000", "-o", "land.ply"],
+                           capture_output=True, text=True)
+        self.assertEqual((r.returncode, r.stdout, r.stderr), (0, "", ""))
+        land = read_ply("land.ply")
+        self.assertEqual(len(land), 40000)
+        scenes = [read_ply(path) for path in given]
+        at, seen, scales = 0, set(), []
+        while at < len(land):
+            ground, at = land[at:at + 256], at + 256
+            numpy.testing.assert_allclose(ground["y"], -height(ground["x"], ground["z"]), atol=1e-5)
+            which = [n for n, s in enumerate(scenes)
+                     if at < len(land) and land["opacity"][at] == numpy.float32(logit(s)[0])]
+            if not which or at + len(scenes[which[0]]) > len(land):
+                break
+            scene = scenes[which[0]]
+            copy, at = land[at:at + len(scene)], at + len(scene)
+            seen.add(which[0])
+            scales.append(self.check_copy(scene, copy, ground))
+        self.assertEqual(seen, {0, 1})
+        self.assertGreater(max(scales) - min(scales), 0.05)
+
+    def check_copy(self, scene, copy, ground):
+        a, b = centres(scene), centres(copy)
+        size = numpy.linalg.norm(a[0] - a, axis=1)
+        far = size.argmax()
+        scale = numpy.linalg.norm(b[0] - b[far]) / size[far]
+        numpy.testing.assert_allclose(numpy.linalg.norm(b[0] - b, axis=1), scale * size,
+                                      atol=1e-4 * scale * size[far])
+        numpy.testing.assert_allclose(b[:, 1] - b[0, 1], scale * (a[:, 1] - a[0, 1]),
+                                      atol=1e-4 * scale * size[far])
+        for name in "scale_0", "scale_1", "scale_2":
+            numpy.testing.assert_allclose(copy[name], scene[name] + numpy.log(scale), atol=1e-4)
+        for name in "f_dc_0", "f_dc_1", "f_dc_2":
+            numpy.testing.assert_array_equal(copy[name], scene[name])
+        low = numpy.sort(a[:, 1])[len(a) - 1 - int(0.02 * (len(a) - 1))]
+        stands = b[0, 1] + scale * (low - a[0, 1])
+        middle = [(ground[n].min() + ground[n].max()) / 2 for n in "xz"]
+        self.assertAlmostEqual(stands, -height(*middle), places=3)
+        width = max(numpy.ptp(numpy.sort(a[:, i])[int(0.02 * (len(a) - 1)):len(a) - int(0.02 * (len(a) - 1))])
+                    for i in (0, 2))
+        self.assertTrue(0.699 < scale * width < 1.201, scale * width)
+        return scale * width
+
+    def test_wrong_landscapes_are_refused(self):
+        donut = os.path.join(program.DATASETS, "donut_slice.ply")
+        for arguments, says in ((("landscape", "-o", "x.ply"), "at least one SCENE"),
+                                (("landscape", donut, "-s", "9", "-o", "x.ply"), "do not apply"),
+                                (("landscape", donut, "-n", "0", "-o", "x.ply"), "--count"),
+                                (("cloud", donut, "-o", "x.raw"), "one argument too many"),
+                                (("cloud", "-n", "5", "-o", "x.raw"), "--count applies"),
+                                (("landscape", donut, "-o", "x.raw"), "must end in .ply"),
+                                (("landscape", "nowhere.ply", "-o", "x.ply"), "nowhere.ply")):
+            r = subprocess.run([program.GENERATE, *arguments], capture_output=True, text=True)
+            self.assertIn(r.returncode, (1, 2), arguments)
+            self.assertIn(says, r.stderr)
+            self.assertFalse(os.path.exists(arguments[-1]))
 
     def test_output_that_cannot_be_written_leaves_nothing(self):
         os.mkdir("folder.raw")
