@@ -60,7 +60,9 @@ void trip_context_drop_renderer(triptych *t)
     trip_context_drop_light(t);
     if (t->renderer)
         t->renderer->ops->destroy(t->renderer);
-    t->renderer = NULL;
+    if (t->device_renderer)
+        t->device_renderer->ops->destroy(t->device_renderer);
+    t->renderer = t->device_renderer = NULL;
 }
 
 /* Makes a reader for the wanted planes, or keeps the current one if it serves. Readers serve all

@@ -48,6 +48,7 @@ struct triptych {
     session session;                         /* of a scene: the budget and the name alone */
     struct trip_gaussian_set *scene;         /* NULL: the data set is a volume */
     struct trip_gaussian_frame *scene_frame; /* the begun frame of a scene */
+    trip_renderer *device_renderer;          /* composites the scene (gl); NULL: `renderer` does */
     double scene_opacity;                    /* factor of the optical depth; 0 means 1 */
     double begun_ms;                         /* when scene_frame was begun */
     bool open, has_function;

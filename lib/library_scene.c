@@ -93,9 +93,9 @@ static int check(const triptych *t, bool *reference)
 {
     const triptych_renderer r = t->resources.renderer;
     *reference = r == TRIPTYCH_RENDERER_REFERENCE;
-    if (r == TRIPTYCH_RENDERER_GL || r == TRIPTYCH_RENDERER_INTEGRAL)
+    if (r == TRIPTYCH_RENDERER_INTEGRAL)
         return trip_fail(TRIP_USAGE, "render", t->name,
-                         "is a Gaussian scene; use --renderer cpu or reference");
+                         "is a Gaussian scene; use --renderer cpu, gl or reference");
     if (t->given.splat.footprint == TRIPTYCH_FOOTPRINT_FIXED)
         return trip_option_fail("--kernel", "fixed does not apply to Gaussian scenes");
     if (t->given.all.method == TRIPTYCH_METHOD_IMAGE)
@@ -154,6 +154,26 @@ static int take_fine(triptych *t, int side)
                      side);
 }
 
+static bool draws_by_gl(const triptych *t)
+{
+    return t->resources.renderer == TRIPTYCH_RENDERER_GL;
+}
+
+/* Makes the renderer that lends its device, if the scene needs one. */
+static int make_device(triptych *t)
+{
+    return !draws_by_gl(t) || t->device_renderer
+               ? 0
+               : trip_renderer_create(&t->device_renderer, TRIP_RENDERER_GL, t->resources.threads,
+                                      t->session.budget);
+}
+
+/* Returns the device that composites, or NULL. */
+static const trip_tile_device *device_of(const triptych *t)
+{
+    return t->device_renderer ? t->device_renderer->ops->tile_device(t->device_renderer) : NULL;
+}
+
 int trip_context_begin_scene(triptych *t)
 {
     bool reference;
@@ -165,6 +185,8 @@ int trip_context_begin_scene(triptych *t)
         status = trip_context_find_view(t, &(triptych_view){ 0 });
     if (!status && !t->renderer) /* lends its threads */
         status = trip_cpu_create(&t->renderer, t->session.budget, t->resources.threads);
+    if (!status)
+        status = make_device(t);
     if (!status)
         status = make_camera(t, side);
     if (!status)
@@ -181,6 +203,7 @@ int trip_context_begin_scene(triptych *t)
         .settings = settings_of(t),
         .by_lists = t->given.scene.order == TRIPTYCH_ORDER_LISTS ? &t->drawn_settings : NULL,
         .reference = reference,
+        .device = device_of(t),
         .budget = t->session.budget,
         .runner = trip_renderer_runner(t->renderer),
     };
@@ -206,7 +229,9 @@ static triptych_frame_stats stats_of(const triptych *t)
         .reads = s.bricks,
         .memory_bytes = trip_budget_limit_bytes(t->session.budget),
         .peak_memory_bytes = trip_budget_peak_bytes(t->session.budget),
-        .renderer = reference ? "reference" : "cpu",
+        .renderer = reference        ? "reference"
+                    : draws_by_gl(t) ? "gl"
+                                     : "cpu",
         .device = reference ? "CPU, double precision, 1 thread" : t->device,
         .engine = "pread",
         .ring = "not used: Gaussians come from windows",
@@ -229,7 +254,8 @@ int trip_context_take_scene(triptych *t, float *rgba, float *depth)
         trip_normalise(rgba, (size_t)t->turned.width * (size_t)t->turned.height,
                        t->settings.background);
     if (!status) {
-        snprintf(t->device, sizeof t->device, "%s", t->renderer->ops->device(t->renderer));
+        const trip_renderer *r = draws_by_gl(t) ? t->device_renderer : t->renderer;
+        snprintf(t->device, sizeof t->device, "%s", r->ops->device(r));
         t->stats = stats_of(t);
         t->has_stats = true;
     }

@@ -86,6 +86,7 @@ static int begin_layer(trip_gaussian_frame *f, layer *l)
                                                  .settings = &settings,
                                                  .budget = p->budget,
                                                  .runner = &p->runner,
+                                                 .device = p->device,
                                              });
 }
 
@@ -117,12 +118,12 @@ static bool is_closed(const layer *l)
     return l->cpu && trip_gaussians_cpu_open_tiles(l->cpu) == 0;
 }
 
-static void take_layer(const layer *l, float *rgba, float *depth)
+static int take_layer(const layer *l, float *rgba, float *depth)
 {
     if (l->cpu)
-        trip_gaussians_cpu_picture(l->cpu, rgba, depth);
-    else
-        trip_gaussians_reference_picture(l->reference, rgba, depth);
+        return trip_gaussians_cpu_picture(l->cpu, rgba, depth);
+    trip_gaussians_reference_picture(l->reference, rgba, depth);
+    return 0;
 }
 
 /* ---- streams ---- */
@@ -360,30 +361,31 @@ static void add_layer(const trip_gaussian_frame *f, const layer *l, float *rgba,
 }
 
 /* Merges the layers drawn so far. */
-static void merge(trip_gaussian_frame *f, float *rgba, float *depth)
+static int merge(trip_gaussian_frame *f, float *rgba, float *depth)
 {
+    int status = 0;
     const size_t pixels = pixels_of(f);
     memset(rgba, 0, 4 * pixels * sizeof *rgba);
     if (depth)
         memset(depth, 0, pixels * sizeof *depth);
-    for (unsigned i = 0; i < f->layer_count; i++) {
-        take_layer(&f->layers[i], f->picture, depth ? f->picture + 4 * pixels : NULL);
-        add_layer(f, &f->layers[i], rgba, depth);
+    for (unsigned i = 0; i < f->layer_count && !status; i++) {
+        status = take_layer(&f->layers[i], f->picture, depth ? f->picture + 4 * pixels : NULL);
+        if (!status)
+            add_layer(f, &f->layers[i], rgba, depth);
     }
     for (size_t i = 0; depth && i < pixels; i++)
         depth[i] = rgba[4 * i + 3] > 0 ? depth[i] / rgba[4 * i + 3] : INFINITY;
     trip_put_behind(rgba, pixels, f->params.settings.background);
+    return status;
 }
 
 int trip_gaussian_frame_picture(trip_gaussian_frame *f, float *rgba, float *depth)
 {
     const double begun = trip_now_ms();
-    if (f->params.by_lists)
-        merge(f, rgba, depth);
-    else
-        take_layer(f->layers, rgba, depth);
+    const int status =
+        f->params.by_lists ? merge(f, rgba, depth) : take_layer(f->layers, rgba, depth);
     f->stats.merge_ms += trip_now_ms() - begun;
-    return 0;
+    return status;
 }
 
 trip_gaussian_frame_stats trip_gaussian_frame_get_stats(const trip_gaussian_frame *f)

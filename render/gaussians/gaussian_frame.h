@@ -12,6 +12,7 @@
 
 #include "gaussian_picture.h"
 #include "gaussian_stream.h"
+#include "gaussian_tiles.h"
 #include "settings.h"
 #include "task_runner.h"
 
@@ -25,6 +26,8 @@ typedef struct trip_gaussian_frame_params {
     /* For the order by lists: its method and h. NULL: by depth. */
     const trip_settings *by_lists;
     bool reference; /* draws in double precision, without threads */
+    /* Composites in place of the CPU; NULL for none. It must outlive the frame. */
+    const trip_tile_device *device;
     trip_budget *budget;
     trip_task_runner runner;
 } trip_gaussian_frame_params;
