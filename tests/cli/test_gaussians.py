@@ -76,6 +76,10 @@ class Gaussians(program.ProgramTest):
         self.works("brick", name + ".ply", "-o", name + ".trip", "-q")
         return name + ".trip"
 
+    def distances(self, data_set, *options):
+        self.works("render", data_set, "-o", "picture.exr", "--depth", "z.exr", *options)
+        return program.read_exr_channels("z.exr")[1][..., 0]
+
     def apart(self, data_set, ply, view, *options):
         """Returns the mean and the largest difference from the definition, in 1/255."""
         expected = definition.draw(definition.read_ply(ply), view)
@@ -85,7 +89,7 @@ class Gaussians(program.ProgramTest):
         return apart.mean(), apart.max()
 
     def expect_definition(self, data_set, ply, view, mean=MEAN, most=MOST):
-        for renderer in "cpu", "reference":
+        for renderer in "cpu", "reference", *program.GL:
             found = self.apart(data_set, ply, view, "--renderer", renderer)
             self.assertLess(found[0], mean, (renderer, view))
             self.assertLess(found[1], most, (renderer, view))
@@ -154,18 +158,20 @@ class Gaussians(program.ProgramTest):
         centre, so 1, 2 and 3 of them leave 1e-2, 1e-4 and 1e-6."""
         data = self.scene("deep", [row((0, 0, z), (1, 1, 1), 0.99, (0.5, 0.5, 0.5)) for z in (-1, 0, 1)])
         view = view_of((0, 0, 9), size=(33, 33), up=(0, 1, 0))
-        for renderer in "cpu", "reference":
+        for renderer in "cpu", "reference", *program.GL:
             for given, left in (0.05, 1), (1e-3, 1e-2), (0, 1e-6):
                 alpha = self.picture(data, *options_of(view), "--renderer", renderer,
                                      "--early-termination", given)[16, 16, 3]
                 self.assertAlmostEqual(1 - alpha, left, delta=0.06 * left + 2e-7, msg=(renderer, given))
 
-    def test_cpu_and_reference_agree_in_both_orders(self):
+    def test_the_renderers_agree_in_both_orders(self):
         data = self.scene("both", many(3000, degree=1), 1)
         for order in "depth", "lists":
-            one, two = (self.picture(data, *options_of(view_of((1.5, -1, 3))), "--order", order,
-                                     "--renderer", renderer) for renderer in ("cpu", "reference"))
-            self.assertLess(255 * numpy.abs(one - two).max(), 1, order)
+            one, *others = (self.picture(data, *options_of(view_of((1.5, -1, 3))), "--order", order,
+                                         "--renderer", renderer)
+                            for renderer in ("cpu", "reference", *program.GL))
+            for other in others:
+                self.assertLess(255 * numpy.abs(one - other).max(), 1, order)
 
     def test_far_coordinates_give_the_same_picture(self):
         """The shift is a sum of powers of two, so that the floats of the file hold it exactly."""
@@ -178,7 +184,7 @@ class Gaussians(program.ProgramTest):
         far = self.scene("far", moved)
         view = view_of((2.3, -1.7, 5.1))
         there = view_of(view["eye"] + shift, shift)
-        for options in (), ("--order", "lists"), ("--renderer", "reference"):
+        for options in (), ("--order", "lists"), *(("--renderer", r) for r in ("reference", *program.GL)):
             a = self.picture(near, *options_of(view), *options)
             b = self.picture(far, *options_of(there), *options)
             self.assertGreater(a[:, :, 3].mean(), 0.05)
@@ -206,6 +212,32 @@ class Gaussians(program.ProgramTest):
         for frame, x in ("f-000.exr", -1), ("f-002.exr", 1):
             alone = self.picture(data, *options_of(view_of((x, 0, 4), size=(40, 40), fov=40)))
             numpy.testing.assert_allclose(program.read_exr(frame), alone, atol=1e-3)
+
+    def test_gl_draws_all_that_cpu_draws(self):
+        program.need_gl()
+        data = self.scene("options", many(3000, degree=2), 2)
+        view = options_of(view_of((1.5, -1, 3)))
+        for options in ((), ("--kernel", "exact"), ("--kernel", "ewa"), ("--sh", "0"),
+                        ("--opacity-scale", "0.3"), ("--samples", "3"), ("--normalise",),
+                        ("--background", "0.2,0.4,0.6"), ("--clip-plane", "1,0.2,0,0.1"),
+                        ("--order", "lists", "--kernel", "exact"), ("--ortho", "3"),
+                        ("--ortho", "3", "--order", "lists", "--kernel", "exact")):
+            given = [*view[:-2], *options] if "--ortho" in options else [*view, *options]
+            one, other = (self.picture(data, *given, "--renderer", r) for r in ("gl", "cpu"))
+            self.assertGreater(other[:, :, 3].mean(), 0.05)
+            self.assertLess(255 * numpy.abs(one - other).max(), 1, options)
+
+    def test_gl_draws_the_distances_of_cpu(self):
+        program.need_gl()
+        data = self.scene("distances", many(3000))
+        for order in "depth", "lists":
+            for options in (), ("--ortho", "3"):
+                one, other = (self.distances(data, "--size", "64", "--order", order, *options,
+                                             "--renderer", r) for r in ("gl", "cpu"))
+                self.assertEqual(numpy.isinf(one).tolist(), numpy.isinf(other).tolist())
+                seen = numpy.isfinite(other)
+                self.assertGreater(seen.sum(), 500)
+                numpy.testing.assert_allclose(one[seen], other[seen], rtol=0.005)
 
     def test_the_background_lies_behind_and_normalise_removes_the_transmittance(self):
         data = self.scene("red", [row((0, 0, 0), (1, 0, 0), 0.5, (3, 3, 3))])
@@ -284,14 +316,20 @@ class Gaussians(program.ProgramTest):
             self.assertLessEqual(stats["memory_peak_bytes"], 64 << 20, order)
             if not program.SANITIZED:
                 self.assertLess(stats["peak_rss_bytes"], (64 << 20) + program_itself, order)
-        self.fails(1, "render", "million.trip", "--size", "128", "-o", "a.png", "--memory", "4M",
-                   says="raise --memory")
+        for renderer in "cpu", *program.GL:
+            self.fails(1, "render", "million.trip", "--size", "128", "-o", "a.png", "--memory", "4M",
+                       "--renderer", renderer, says="raise --memory")
+        for order in ("depth", "lists") if program.GL else ():
+            stats = self.stats("million.trip", "--size", "128", "--order", order, "--memory", "64M",
+                               "--renderer", "gl")
+            self.assertLessEqual(stats["memory_peak_bytes"], 64 << 20, order)
         shutil.rmtree("million.trip")
 
     def test_ctrl_c_ends_a_run_soon_and_leaves_nothing(self):
         write_scene("long.ply", many(400000, spread=10))
         for command in ("brick", "long.ply", "-o", "long.trip"), \
-                       ("render", "long.ply", "--samples", "8", "-o", "long.png"):
+                       *(("render", "long.ply", "--samples", "8", "-o", "long.png", "--renderer", r)
+                         for r in ("cpu", *program.GL)):
             run = program.start(*command)
             program.await_handler(run)
             time.sleep(0.1)
@@ -364,7 +402,7 @@ class Gaussians(program.ProgramTest):
         data = self.scene("settings", [row((0, 0, 0))])
         for options in ("--lod", "1"), ("--interpolation", "cubic"), ("--compositing", "sheet"), \
                        ("--error", "1"), ("--kernel", "fixed"), ("--tf", "bone"), \
-                       ("--effects", "shadows"), ("--renderer", "gl"), ("--renderer", "integral"):
+                       ("--effects", "shadows"), ("--renderer", "integral"):
             self.leaves_nothing(2, "render", data, "-o", "a.png", *options)
         self.leaves_nothing(2, "render", "settings.ply", "-o", "a.png", "--spacing", "1,1,1",
                             says="does not apply to Gaussian scenes")
