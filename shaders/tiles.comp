@@ -32,13 +32,13 @@ void main()
 {
     trip_gl_tile job = jobs[first_job + gl_WorkGroupID.x];
     ivec2 pixel = pixel_of(job.tile);
-    uint at = plane_of(job.tile), step = uint(TRIP_GL_TILE_PIXELS);
+    uint at = plane_of(job.tile), plane = uint(TRIP_GL_TILE_PIXELS);
     float passes = planes[at];
     if (passes <= 0.0)
         return;
-    vec3 colour = vec3(planes[at + step], planes[at + 2u * step], planes[at + 3u * step]);
+    vec3 colour = vec3(planes[at + plane], planes[at + 2u * plane], planes[at + 3u * plane]);
 #ifdef DEPTH
-    float depth = planes[at + 4u * step];
+    float depth = planes[at + 4u * plane];
 #endif
     for (uint i = 0u; i < job.count; i++) {
         uint n = pairs[job.first + i], tile = splats[n].tile;
@@ -64,10 +64,10 @@ void main()
         passes = after;
     }
     planes[at] = passes;
-    planes[at + step] = colour.r;
-    planes[at + 2u * step] = colour.g;
-    planes[at + 3u * step] = colour.b;
+    planes[at + plane] = colour.r;
+    planes[at + 2u * plane] = colour.g;
+    planes[at + 3u * plane] = colour.b;
 #ifdef DEPTH
-    planes[at + 4u * step] = depth;
+    planes[at + 4u * plane] = depth;
 #endif
 }

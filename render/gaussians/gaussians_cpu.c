@@ -44,8 +44,8 @@ struct trip_gaussians_cpu {
     size_t tiles;
     size_t tile_floats;  /* of a tile's planes */
     size_t tile_task;    /* tiles of a task */
-    size_t planes_tiles; /* all, or those of a strip of rows that a device writes */
-    int strip_rows;
+    size_t planes_tiles; /* tiles in `planes`: strip_rows rows */
+    int strip_rows;      /* rows that a device writes at once; without a device all rows */
     float *planes;
     uint16_t *open; /* for each tile, see trip_tile_kernels.draw */
 
@@ -475,8 +475,10 @@ static int draw_batch(trip_gaussians_cpu *g)
 
 int trip_gaussians_cpu_add(trip_gaussians_cpu *g, const trip_gaussian *gaussians, size_t count)
 {
-    int status = 0;
-    for (size_t i = 0; i < count && !status; i += g->next) {
+    for (size_t i = 0; i < count; i += g->next) {
+        int status = trip_frame_poll();
+        if (status)
+            return status;
         const size_t room = g->batch_max - g->batch;
         g->gaussians = gaussians + i;
         g->next = count - i < room ? count - i : room;
@@ -486,10 +488,10 @@ int trip_gaussians_cpu_add(trip_gaussians_cpu *g, const trip_gaussian *gaussians
         /* A device takes large batches only: each loads and stores planes. */
         if (!g->device || g->batch == g->batch_max)
             status = draw_batch(g);
-        if (!status)
-            status = trip_frame_poll();
+        if (status)
+            return status;
     }
-    return status;
+    return 0;
 }
 
 /* ---- results ---- */

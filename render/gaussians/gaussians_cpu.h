@@ -6,8 +6,8 @@
  * Each batch is projected, then listed tile by tile in its order, then composited tile by tile. A
  * tile is closed once none of its pixels takes more. Closed tiles cost nothing.
  *
- * With a device, the CPU projects and lists, and the device composites. Rounding is then its own.
- */
+ * With a device, the CPU projects and lists, and the device composites. Gaussians then wait for a
+ * full batch, and closed tiles become known some pieces later. Pictures may differ by rounding. */
 #ifndef TRIP_GAUSSIANS_CPU_H
 #define TRIP_GAUSSIANS_CPU_H
 

@@ -37,7 +37,8 @@ struct trip_tiles {
     GLuint planes[BANDS_MAX]; /* of each band */
     unsigned bands;
     GLuint closed;                       /* closed pixels of each tile */
-    uint64_t bytes;                      /* charged for `planes` and `closed` */
+    GLuint lists;                        /* a copy of the slot's, since many tiles read a splat */
+    uint64_t bytes;                      /* charged for these buffers */
     size_t curves_at, pairs_at, jobs_at; /* in piece_slot.lists */
     piece_slot slots[SLOTS];
     unsigned next;
@@ -59,6 +60,7 @@ static void end(trip_tiles *t)
         trip_gl_queue_leave(t->of->queue); /* GL keeps deleted buffers that are still in use */
         glDeleteBuffers((GLsizei)t->bands, t->planes);
         glDeleteBuffers(1, &t->closed);
+        glDeleteBuffers(1, &t->lists);
         for (int i = 0; i < SLOTS; i++) {
             trip_gl_slot_release(&t->slots[i].lists, budget);
             trip_gl_slot_release(&t->slots[i].closed, budget);
@@ -100,7 +102,7 @@ static bool make_planes(trip_tiles *t)
     return make_buffer(t, &t->closed, t->count * sizeof(uint32_t));
 }
 
-static bool make_slots(trip_tiles *t)
+static bool make_lists(trip_tiles *t)
 {
     const trip_tiles_params *p = &t->params;
     const size_t curves = p->curved ? p->splats_max * sizeof(struct trip_gl_curve) : 0;
@@ -112,7 +114,7 @@ static bool make_slots(trip_tiles *t)
         if (!trip_gl_slot_make(&t->slots[i].lists, bytes, false, p->budget) ||
             !trip_gl_slot_make(&t->slots[i].closed, t->count * sizeof(uint32_t), true, p->budget))
             return false;
-    return true;
+    return make_buffer(t, &t->lists, t->jobs_at);
 }
 
 /* ---- passes ---- */
@@ -177,7 +179,7 @@ static int begin(void *user, trip_tiles **out, const trip_tiles_params *params)
     t->count = (size_t)t->columns * (size_t)t->rows;
     t->tile_bytes = (size_t)(params->depth ? TRIP_TILE_PLANES_MAX : TRIP_TILE_DEPTH) *
                     TRIP_TILE_PIXELS * sizeof(float);
-    status = make_planes(t) && make_slots(t) ? clear(t) : 1;
+    status = make_planes(t) && make_lists(t) ? clear(t) : 1;
     if (status)
         end(t);
     else
@@ -245,19 +247,25 @@ static int take_slot(trip_tiles *t, uint16_t *open, piece_slot **out)
     return 0;
 }
 
-static void bind_lists(const trip_tiles *t, const piece_slot *slot)
+/* Copies and binds a part of the lists. */
+static void take_list(const trip_tiles *t, const piece_slot *slot, GLuint binding, size_t at,
+                      size_t bytes)
 {
-    const GLuint buffer = slot->lists.buffer;
-    const size_t ends = slot->lists.bytes;
-    glBindBufferRange(GL_SHADER_STORAGE_BUFFER, TRIP_GL_TILE_SPLATS, buffer, 0,
-                      (GLsizeiptr)(t->params.splats_max * sizeof(struct trip_gl_projected)));
-    if (t->params.curved)
-        glBindBufferRange(GL_SHADER_STORAGE_BUFFER, TRIP_GL_TILE_CURVES, buffer,
-                          (GLintptr)t->curves_at, (GLsizeiptr)(t->pairs_at - t->curves_at));
-    glBindBufferRange(GL_SHADER_STORAGE_BUFFER, TRIP_GL_TILE_PAIRS, buffer, (GLintptr)t->pairs_at,
-                      (GLsizeiptr)(t->jobs_at - t->pairs_at));
-    glBindBufferRange(GL_SHADER_STORAGE_BUFFER, TRIP_GL_TILE_JOBS, buffer, (GLintptr)t->jobs_at,
-                      (GLsizeiptr)(ends - t->jobs_at));
+    if (!bytes)
+        return;
+    glCopyNamedBufferSubData(slot->lists.buffer, t->lists, (GLintptr)at, (GLintptr)at,
+                             (GLsizeiptr)bytes);
+    glBindBufferRange(GL_SHADER_STORAGE_BUFFER, binding, t->lists, (GLintptr)at, (GLsizeiptr)bytes);
+}
+
+static void take_lists(const trip_tiles *t, const piece_slot *slot, const trip_tile_piece *piece)
+{
+    const size_t curves = t->params.curved ? piece->splat_to : 0;
+    take_list(t, slot, TRIP_GL_TILE_SPLATS, 0, piece->splat_to * sizeof(struct trip_gl_projected));
+    take_list(t, slot, TRIP_GL_TILE_CURVES, t->curves_at, curves * sizeof(struct trip_gl_curve));
+    take_list(t, slot, TRIP_GL_TILE_PAIRS, t->pairs_at, piece->pair_count * sizeof(uint32_t));
+    glBindBufferRange(GL_SHADER_STORAGE_BUFFER, TRIP_GL_TILE_JOBS, slot->lists.buffer,
+                      (GLintptr)t->jobs_at, (GLsizeiptr)(slot->lists.bytes - t->jobs_at));
 }
 
 /* Writes the jobs of a band from *tile on, as many as one part should have. Returns their number.
@@ -287,7 +295,7 @@ static int composite(const trip_tiles *t, const piece_slot *slot, const trip_til
     int status = use_program(t, TRIP_GL_PASS_TILES);
     if (status)
         return status;
-    bind_lists(t, slot);
+    take_lists(t, slot, piece);
     glUniform1f(TRIP_GL_TILE_TERMINATION, t->params.termination);
     for (unsigned band = 0; band < t->bands; band++) {
         bind_band(t, band);
@@ -309,6 +317,8 @@ static int composite(const trip_tiles *t, const piece_slot *slot, const trip_til
 static int draw(trip_tiles *t, const trip_tile_piece *piece, uint16_t *open)
 {
     piece_slot *slot;
+    if (!piece->pair_count)
+        return 0;
     int status = trip_gl_context_use(t->of->context);
     if (!status)
         status = take_slot(t, open, &slot);

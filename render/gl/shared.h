@@ -319,8 +319,8 @@ struct trip_gl_projected {
     TRIP_GL_UINT tile;
 };
 
-/* The rest of a curved footprint: trip_curve with w, a and b at the same pixel. w is 1 and all
- * others are 0 if it is not curved. */
+/* The rest of a curved footprint: trip_curve with w, a and b at the same pixel. If a footprint is
+ * not curved, its w is 1 and all other numbers are 0. */
 struct trip_gl_curve {
     TRIP_GL_VEC4 w_a_b; /* w, a, b, turn */
     TRIP_GL_VEC4 steps; /* bend_x, bend_y, tilt, skew */

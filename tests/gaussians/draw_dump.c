@@ -7,8 +7,8 @@
  * - Settings: degree, antialiased, opacity scale, depth, shape.
  * - Each Gaussian in the order of drawing: centre, deviations, rotation, opacity, 48 coefficients.
  *
- * OUT gets 4 floats for each pixel, then the distances with depth. RENDERER is cpu, gl or reference.
- * With REPEATS it draws again and prints the times. */
+ * OUT gets 4 floats for each pixel, then the distances with depth. RENDERER is cpu, gl or
+ * reference. With REPEATS it draws again and prints the times. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>

@@ -1,6 +1,6 @@
 /* Gaussian scenes by gl: closed forms, hard cases beside cpu and the reference, memory, cancelling.
- * The mean difference is below 0.01 of 255 and no pixel differs by 2, since a pixel may lie on the
- * other side of a bound of alpha by rounding. */
+ * The mean difference is below 0.01 of 255, and no pixel differs by 2. Rounding may move a pixel to
+ * the other side of a bound of alpha. */
 #include "gaussians_cpu.h"
 #include "gaussians_reference.h"
 #include "scenes.h"
@@ -56,8 +56,8 @@ static int nearer(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* A repeatable scene in order of depth, with the given centre of its eye: many small Gaussians,
- * some long and thin, some very large, some opaque, some flat, some near the eye and behind it. */
+/* A repeatable scene around an eye, in order of depth. Many Gaussians are small, some are long and
+ * thin, very large, opaque or flat. Some are near the eye, and some behind it. */
 static const trip_gaussian *random_scene(trip_vec3 eye)
 {
     static trip_gaussian plain[SCENE], moved[SCENE];
