@@ -113,6 +113,11 @@ static int add_to_layer(layer *l, const trip_gaussian *batch, size_t count)
                   : trip_gaussians_reference_add(l->reference, batch, count);
 }
 
+static int end_layer(layer *l)
+{
+    return l->cpu ? trip_gaussians_cpu_flush(l->cpu) : 0;
+}
+
 static bool is_closed(const layer *l)
 {
     return l->cpu && trip_gaussians_cpu_open_tiles(l->cpu) == 0;
@@ -313,6 +318,8 @@ static int draw_batch(trip_gaussian_frame *f)
     const double begun = trip_now_ms();
     if (!status && count)
         status = add_to_layer(l, batch, count);
+    else if (!status)
+        status = end_layer(l);
     f->stats.draw_ms += trip_now_ms() - begun;
     f->stats.gaussians += count;
     if (status || count)

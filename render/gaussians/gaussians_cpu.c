@@ -454,7 +454,7 @@ static void project_next(trip_gaussians_cpu *g)
 }
 
 /* Lists and composites the batch, and empties it. */
-static int draw_batch(trip_gaussians_cpu *g)
+int trip_gaussians_cpu_flush(trip_gaussians_cpu *g)
 {
     int status = 0;
     for (g->piece_to = 0; g->piece_to < g->batch && !status;) {
@@ -487,7 +487,7 @@ int trip_gaussians_cpu_add(trip_gaussians_cpu *g, const trip_gaussian *gaussians
             project_next(g);
         /* A device takes large batches only: each loads and stores planes. */
         if (!g->device || g->batch == g->batch_max)
-            status = draw_batch(g);
+            status = trip_gaussians_cpu_flush(g);
         if (status)
             return status;
     }
@@ -570,7 +570,7 @@ static void write_rows(void *context, unsigned row)
 int trip_gaussians_cpu_picture(trip_gaussians_cpu *g, float *rgba, float *depth)
 {
     picture p = { g, rgba, g->settings.depth ? depth : NULL, 0 };
-    int status = draw_batch(g);
+    int status = trip_gaussians_cpu_flush(g);
     for (; p.first_row < g->rows && !status; p.first_row += g->strip_rows) {
         const int rows = clamped(g->rows - p.first_row, g->strip_rows);
         if (g->device)

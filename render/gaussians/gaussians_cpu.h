@@ -46,6 +46,9 @@ void trip_gaussians_cpu_end(trip_gaussians_cpu *g);
 /* Draws Gaussians behind all earlier ones, the first in front. Fails if it is interrupted. */
 int trip_gaussians_cpu_add(trip_gaussians_cpu *g, const trip_gaussian *gaussians, size_t count);
 
+/* Draws the Gaussians that wait for a full batch. trip_gaussians_cpu_picture() does so too. */
+int trip_gaussians_cpu_flush(trip_gaussians_cpu *g);
+
 /* Returns whether a tile is open that has a pixel in the rectangle, in pixels. A Gaussian that only
  * meets closed tiles changes nothing. */
 bool trip_gaussians_cpu_is_open(const trip_gaussians_cpu *g, const double lo[2],
