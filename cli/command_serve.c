@@ -70,7 +70,6 @@ static int parse_options(serve_options *o, int argc, char **argv)
 {
     const uint64_t only_tf = ~(UINT64_C(1) << LOOK_TF);
     const uint64_t files = UINT64_C(1) << DRAW_DEPTH | UINT64_C(1) << DRAW_COUNT;
-    const uint64_t scenes = UINT64_C(1) << DRAW_ORDER | UINT64_C(1) << DRAW_HARMONICS;
     const uint64_t integral = UINT64_C(1) << DRAW_FIELD | UINT64_C(1) << DRAW_TOLERANCE;
     const uint64_t others = UINT64_C(1) << RESOURCE_RENDERER | UINT64_C(1) << RESOURCE_OCCLUDED;
     parse p = { .o = o,
@@ -79,7 +78,7 @@ static int parse_options(serve_options *o, int argc, char **argv)
                     [LOOK] = { .table = &look_table, .base = &o->look, .without = only_tf },
                     [SETTINGS] = { .table = &draw_settings_table,
                                    .base = &o->params.settings,
-                                   .without = files | integral | scenes },
+                                   .without = files | integral },
                     [HEAT] = { .table = &heat_table, .base = &o->params.heat },
                     [QUALITY] = { .table = &quality_table, .base = &o->quality },
                     [RENDERER] = { .table = &viewer_renderer_table, .base = &o->resources },
@@ -114,12 +113,11 @@ static int check_input(const serve_options *o)
 {
     const trip_serve_params *p = &o->params;
     triptych *t = NULL;
-    const triptych_resources resources = { .memory_bytes = p->memory_bytes };
     int status = library_create(&t, NULL);
     if (!status)
-        status = viewed_volume_check(&o->volume, t, p->input, &resources);
+        status = viewed_volume_check(&o->volume, t, p->input, &o->resources);
     if (!status)
-        status = library_check_heat(t, p->heat, &resources);
+        status = library_check_heat(t, p->heat, &o->resources);
     triptych_destroy(t);
     return status;
 }

@@ -64,7 +64,11 @@ static void add_document(cJSON *root, trip_viewer *v)
     cJSON_AddNumberToObject(root, "documents", v->count);
     if (d)
         cJSON_AddStringToObject(root, "input", d->input);
-    cJSON *dims = d && d->opened ? cJSON_AddArrayToObject(root, "dims") : NULL;
+    if (d && d->is_scene) {
+        cJSON_AddNumberToObject(root, "gaussians", (double)d->scene.gaussians);
+        cJSON_AddStringToObject(root, "order", draw_settings_choice(&d->settings, DRAW_ORDER));
+    }
+    cJSON *dims = d && d->opened && !d->is_scene ? cJSON_AddArrayToObject(root, "dims") : NULL;
     for (int a = 0; a < 3 && dims; a++)
         cJSON_AddItemToArray(dims, cJSON_CreateNumber((double)d->info.dims[a]));
     if (camera)

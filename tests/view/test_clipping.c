@@ -14,11 +14,11 @@ static void the_box_begins_around_all_voxels_and_is_never_empty(void **state)
 {
     (void)state;
     triptych_clip c = { 0 };
-    trip_clipping_box_of_all(&c, &info);
+    trip_clipping_box_of_all(&c, &info, false);
     assert_true(c.box && c.box_of_voxels && c.box_lo[0] == 1.5 && c.box_hi[2] == 20.5);
-    trip_clipping_set_face(&c, 1, 0, 100);
+    trip_clipping_set_face(&c, 1, 0, 100, 0.01);
     assert_true(c.box_lo[1] < c.box_hi[1] && c.box_hi[1] == 7.5);
-    trip_clipping_set_face(&c, 1, 1, -100);
+    trip_clipping_set_face(&c, 1, 1, -100, 0.01);
     assert_true(c.box_lo[1] < c.box_hi[1] && trip_clipping_is_sound(&c));
 }
 
