@@ -782,7 +782,7 @@ void draw_gauges(trip_panel *p, trip_viewer *v, const trip_document *d)
     float times[TIMES];
     const int count = trip_frames_get_times(v->frames, TIMES, times);
     if (d->is_scene) {
-        trip_scene_say(&d->scene, &shown, &s, text, sizeof text);
+        trip_scene_say(&d->scene, &shown, nullptr, text, sizeof text);
         ImGui::TextWrapped("%s", text);
     }
     draw_memory(p, f);

@@ -65,7 +65,7 @@ void trip_scene_say(const triptych_scene *scene, const draw_settings *s,
     const size_t at =
         (size_t)snprintf(text, bytes, "%llu Gaussians by %s", (unsigned long long)scene->gaussians,
                          draw_settings_choice(s, DRAW_ORDER));
-    if (!(status->whole_ms > 0) || at >= bytes)
+    if (!status || !(status->whole_ms > 0) || at >= bytes)
         return;
     trip_format_bytes(status->stats.peak_memory_bytes, peak);
     trip_format_bytes(status->stats.memory_bytes, all);
