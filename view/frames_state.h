@@ -61,6 +61,7 @@ struct trip_frames {
     bool awaits_choice;         /* the full picture has the defaults until triptych_choose() */
     bool whole;                 /* rgba is the full picture of the wanted view */
     double shown_ms;            /* time of the last shown picture */
+    double woken_ms;            /* time of the last shown progress */
     double taken_ms;            /* the last part of a picture took this long */
 };
 

@@ -71,8 +71,8 @@ static void show_stage(trip_frames *f, const char *stage, double done)
     f->status.done = done;
     pthread_mutex_unlock(&f->lock);
     const double ms = trip_now_ms();
-    if (ms - f->shown_ms > 50) {
-        f->shown_ms = ms;
+    if (ms - f->woken_ms > 50) {
+        f->woken_ms = ms;
         wake(f);
     }
 }

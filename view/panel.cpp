@@ -1200,3 +1200,12 @@ bool trip_panel_find(trip_panel *p, const char *label, double box[4])
     box[3] = static_cast<double>(b.hi.y);
     return b.seen;
 }
+
+int trip_panel_labels(const trip_panel *p, const char *labels[TRIP_PANEL_LABELS])
+{
+    int count = 0;
+    for (const auto &box : p->boxes)
+        if (count < TRIP_PANEL_LABELS)
+            labels[count++] = box.first.c_str();
+    return count;
+}
