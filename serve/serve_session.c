@@ -299,10 +299,11 @@ static bool set_setting(trip_document *d, const char *name, const char *value)
     if (known && *value)
         status = trip_option_read(&draw_settings_table, name, value, &next, &given);
     trip_scope_enter(before);
-    const bool good = known && !status && applies(d, name, &next);
-    if (good)
-        d->settings = next;
-    return good;
+    if (!known || status || !applies(d, name, &next))
+        return false;
+    d->settings = next;
+    d->clips |= *value && !strncmp(name, "clip-", 5); /* clipping that is set becomes active */
+    return true;
 }
 
 static bool set_switch(trip_document *d, const trip_effect_switch *e, const char *value)

@@ -352,8 +352,7 @@ class Gaussians(program.ProgramTest):
     def test_commands_for_volumes_refuse_scenes(self):
         data = self.scene("refused", [row((0, 0, 0))])
         for name in data, "refused.ply":
-            for command in ("view", name), ("serve", name), ("accuracy", name, "-o", "r"), \
-                           ("bench", "stream", name):
+            for command in ("accuracy", name, "-o", "r"), ("bench", "stream", name):
                 self.leaves_nothing(2, *command,
                                     says=f"{name}: is a Gaussian scene; `triptych render` draws it")
         self.fails(2, "render", data, data, "-o", "a.png", says="give one scene at a time")
@@ -368,6 +367,14 @@ class Gaussians(program.ProgramTest):
             self.leaves_nothing(2, "render", data, "-o", "a.png", *options)
         self.leaves_nothing(2, "render", "settings.ply", "-o", "a.png", "--spacing", "1,1,1",
                             says="does not apply to Gaussian scenes")
+        for options, says in ((["--clip-box", "voxels:0,0,0,1,1,1"], "--clip-box: voxels: does not apply"),
+                              (["--h", "0.5"], "--h: does not apply to scenes with --order depth"),
+                              (["--method", "clip", "--order", "depth"], "--method: does not apply to scenes"),
+                              (["--engine", "null"], "--engine: must be pread"),
+                              (["--engine", "io_uring"], "--engine: must be pread"),
+                              (["--occluded", "draw"], "--occluded: does not apply")):
+            for name in data, "settings.ply":
+                self.leaves_nothing(2, "render", name, "-o", "a.png", *options, says=says)
 
     def test_settings_of_scenes_are_refused_for_volumes(self):
         tooth = os.path.join(program.DATASETS, "tooth.nhdr")
