@@ -614,8 +614,8 @@ class View(program.ProgramTest):
             os.remove(path)
         self.view("wait\npicture seen.exr\nkey m\n", "scene.trip")
         self.works("render", "scene.trip", "--path=scene-001.json", f"--size={WIDTH - PANEL}x{HEIGHT}",
-                   "--background=0,0,0", "-o", "flown.exr")
-        flown, = glob.glob("flown*.exr")
+                   "--background=0,0,0", "-o", "marked.exr")
+        flown, = glob.glob("marked*.exr")
         self.assertTrue((program.read_exr(flown) == program.read_exr("seen.exr")).all())
 
     def test_scenes_and_volumes_share_a_window(self):
