@@ -89,7 +89,8 @@ static int parse_options(serve_options *o, int argc, char **argv)
                 } };
     const command_line c = {
         .args_doc = "VOLUME|NAME.trip",
-        .doc = "Shows a volume or a data set in a browser, at the address that this command "
+        .doc = "Shows a volume, a Gaussian scene or a data set in a browser, at the address that "
+               "this command "
                "prints, until it is interrupted. A moving view is sent as JPEG. At rest the page "
                "gets the picture of `triptych render` as PNG. The server listens to 127.0.0.1 "
                "only, and answers only requests with the token in the address. To look from "

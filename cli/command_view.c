@@ -140,7 +140,8 @@ static int parse_options(view_command *o, int argc, char **argv)
                 } };
     const command_line c = {
         .args_doc = "[VOLUME|NAME.trip...]",
-        .doc = "Shows volumes or data sets in a window, where you turn, cut, classify and fly "
+        .doc = "Shows volumes, Gaussian scenes or data sets in a window, where you turn, cut, "
+               "classify and fly "
                "through them. A moving view is drawn with as little detail as keeps to --fps. At "
                "rest the picture equals the picture of `triptych render`, bit for bit. A volume is "
                "first bricked into a cache; `triptych cache` lists and clears the cache.\vF1 lists "

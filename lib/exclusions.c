@@ -318,7 +318,7 @@ static const uint64_t of_both = ROW(BACKGROUND) | ROW(CLIP_BOX) | ROW(CLIP_PLANE
                                 ROW(EARLY_TERMINATION) | ROW(FOOTPRINT) | ROW(SAMPLES) |
                                 ROW(DEPTH) | ROW(NORMALISE) | ROW(METHOD) | ROW(H);
 
-/* Choices of these rows that scenes do not have, and the reason. */
+/* A scene does not have these choices, for these reasons. */
 static const struct choice {
     int row, choice; /* index in trip_option.choices */
     const char *why;

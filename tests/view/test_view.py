@@ -455,7 +455,7 @@ class View(program.ProgramTest):
     def test_the_viewer_survives_random_events(self):
         count = 150 * ROUNDS
         self.view(f"wait\nrandom {count} 1\nwait\nresize 600 400\nwait\nstatus status.json\n"
-                  "key 0\nwait\nscreenshot s.exr\n", "noise.trip", "ball.trip", size="500x300")
+                  "key 0\nwait\nscreenshot s.exr\n", "noise.trip", "ball.trip", "scene.trip", size="500x300")
         status = self.status()
         self.assertTrue(status["exact"] or status["documents"] == 0, status)
 
