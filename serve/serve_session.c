@@ -8,6 +8,7 @@
 #include <string.h>
 #include <time.h>
 
+#include "clipping.h"
 #include "clock.h"
 #include "encode.h"
 #include "json.h"
@@ -505,6 +506,19 @@ static void add_scene(cJSON *root, const trip_document *d, const draw_settings *
             cJSON_AddItemToArray(rows, cJSON_CreateString(draw_settings_table.rows[i].name));
 }
 
+/* Writes the range of the page's clipping box, in world units: lower corner, upper corner. */
+static void add_bounds(cJSON *root, const trip_document *d)
+{
+    triptych_clip all = { 0 };
+    if (d->is_scene)
+        trip_clipping_box_of_all(&all, &d->info, true);
+    const double *corners[2] = { d->is_scene ? all.box_lo : d->info.lo,
+                                 d->is_scene ? all.box_hi : d->info.hi };
+    cJSON *bounds = cJSON_AddArrayToObject(root, "bounds");
+    for (int i = 0; i < 6; i++)
+        cJSON_AddItemToArray(bounds, cJSON_CreateNumber(corners[i / 3][i % 3]));
+}
+
 bool trip_session_take_failure(trip_session *s, char *line, size_t bytes)
 {
     const trip_frames_status status = trip_frames_get_status(s->frames);
@@ -527,6 +541,8 @@ char *trip_session_status(trip_session *s)
     trip_effects_say(&settings, d ? trip_viewer_heat(d) : NULL, effects, sizeof effects);
     const bool of_volume = d && !d->is_scene;
     cJSON_AddBoolToObject(root, "opened", d && d->opened);
+    if (d && d->opened)
+        add_bounds(root, d);
     if (of_volume && d->opened)
         add_light(root, d);
     if (of_volume)

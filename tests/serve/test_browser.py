@@ -150,6 +150,8 @@ class InBrowser(Page):
         self.browser.value("document.getElementById('panel').open = true")
         for query, value in (
             ("[data-set=opacity]", "value = '-0.5'"), ("[data-set=background]", "value = '#203040'"),
+            ("#parallel", "checked = true"), ("#parallel", "checked = false"), ("#clip", "checked = true"),
+            ("#box input", "value = '12'"), ("#clip", "checked = false"),
             ("[data-set=no-shading]", "checked = false"),
             ("[data-set=no-shading]", "checked = true"), ("#head", "checked = false"),
             ("#round", "value = '90'"), ("#up", "value = '-40'"), ("#head", "checked = true"),
@@ -325,7 +327,8 @@ class SceneInBrowser(Page):
         self.exact()
         self.browser.value("panel.open = document.getElementById('papers').open = true")
         self.ready("#order")
-        shown = {"Order", "Footprint", "Harmonics", "Opacity", "Background", "Early termination"}
+        shown = {"Order", "Footprint", "Harmonics", "Opacity", "Background", "Early termination", "Parallel view",
+                 "Clip box"}
         for order, more in ("depth", set()), ("lists", {"Method", "Blend start (h)"}), ("depth", set()):
             self.choose("#order", f"value = '{order}'")
             for _ in range(500):
@@ -342,11 +345,14 @@ class SceneInBrowser(Page):
             ("#kernel", "value = 'exact'"), ("#sh", "value = '0'"), ("[data-set=opacity]", "value = '0.5'"),
             ("[data-set=background]", "value = '#203040'"), ("#order", "value = 'depth'"),
             ("#kernel", "value = ''"), ("#sh", "value = ''"), ("#order", "value = 'lists'"),
+            ("#parallel", "checked = true"), ("#clip", "checked = true"), ("#box input", "value = '0'"),
+            ("#box label:last-child input", "value = '0.1'"),
         ):
             self.choose(query, value)
             before = self.exact(before)
         camera = self.status()["camera"]
-        self.assertIn("--order lists", camera)
+        for option in "--order lists", "--ortho ", "--clip-box 0,":
+            self.assertIn(option, camera)
         self.browser.call("Page.reload")
         self.exact()
         self.ready("#order")
@@ -358,7 +364,10 @@ class SceneInBrowser(Page):
         self.assertTrue(said.startswith("exact, 500 Gaussians by lists, "), said)
         self.assertEqual(self.browser.value("[order.value, document.querySelector('[data-set=background]').value]"),
                          ["lists", "#203040"])
-        self.choose("#order", "value = 'depth'")
+        self.assertEqual(self.browser.value("[parallel.checked, clip.checked, box.hidden, faces[0].value]"),
+                         [True, True, False, "0"])
+        for query, value in ("#order", "value = 'depth'"), ("#clip", "checked = false"), ("#parallel", "checked = false"):
+            self.choose(query, value)
         self.exact()
 
 
