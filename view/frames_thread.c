@@ -441,7 +441,7 @@ typedef struct frame {
     double begun_ms;
 } frame;
 
-enum { STEP_NS = 10000000, PART_MS = 150, MAX_MS = 1000 };
+enum { STEP_NS = 10000000, PART_MS = 150, SLOW_MS = 400, MAX_MS = 1000 };
 /* Taking and showing the parts of a picture takes at most about this share of its time. */
 #define PARTS_SHARE 0.2
 
@@ -620,13 +620,13 @@ static int draw_chosen(trip_frames *f)
     return status ? status : draw(f, 1, 1, &f->now.settings, false);
 }
 
-/* Returns whether a frame of fewer pixels would take about as long as the full one. Every Gaussian
- * in view is read for both. */
+/* Returns whether a frame of fewer pixels would take long, and about as long as the full one. Every
+ * Gaussian in view is read for both. */
 static bool gains_little(const trip_frames *f, double target_ms, double whole_ms)
 {
     const double detail = trip_pace_scale(&f->pace, wanted_pixels(f), MOVING_SHARE * target_ms);
     const double small_ms = trip_pace_expect_ms(&f->pace, detail * detail * wanted_pixels(f));
-    return f->is_scene && small_ms > LITTLE_SHARE * whole_ms;
+    return f->is_scene && small_ms > SLOW_MS && small_ms > LITTLE_SHARE * whole_ms;
 }
 
 /* Draws a picture at once, then the full one. If the full one takes long, draws a coarse one of

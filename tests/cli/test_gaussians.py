@@ -347,6 +347,15 @@ class Gaussians(program.ProgramTest):
             file.write(bytes([byte[0] ^ 1]))
         self.fails(1, "info", "--verify", data)
 
+    def test_bench_flies_through_a_scene(self):
+        data = self.scene("flown", many(300))
+        report = json.loads(self.works("bench", "flight", data, "--seconds", "0.4", "--size", "90x60", "--json").stdout)
+        self.assertEqual(report["settings"]["gaussians"], 300)
+        rest, = report["tables"]["rest"]["rows"]
+        self.assertEqual(rest["differ"], 0)
+        self.assertGreater(rest["first_ms"], 0)
+        self.fails(2, "bench", "flight", data, "--tf", "bone", "--seconds", "0.1")
+
     # ---- refusals ----
 
     def test_commands_for_volumes_refuse_scenes(self):
