@@ -605,7 +605,8 @@ typedef struct triptych_settings {
     triptych_interpolation interpolation;
     triptych_show show; /* not with the integral, which has no lists and no levels */
     /* Merge: weight at which layers begin to blend, 0 (TRIPTYCH_ZERO) to below 1. The default is
-     * 0.85 for pre and 0.99 for post. */
+     * 0.85 for pre and 0.99 for post. A scene drawn by depth has one layer, and refuses h and
+     * `method`. */
     double h;
     /* Transmittance below which a pixel takes no more samples or splats: 0 (TRIPTYCH_ZERO, never)
      * to 0.1. No component of a pixel changes by more than this number. The default is 1/8192 for

@@ -785,6 +785,10 @@ void draw_gauges(trip_panel *p, trip_viewer *v, const trip_document *d)
         trip_scene_say(&d->scene, &shown, nullptr, text, sizeof text);
         ImGui::TextWrapped("%s", text);
     }
+    if (!f.memory_bytes) { // no full picture yet
+        ImGui::TextDisabled("No picture is complete yet.");
+        return;
+    }
     draw_memory(p, f);
     if (!d->is_scene) // the system caches the files of a scene
         draw_cached(p, f);
