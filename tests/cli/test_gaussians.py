@@ -52,6 +52,14 @@ def many(count, spread=1.0, seed=1, degree=0):
         r.uniform(-4.5, -2.5, (count, 3)) + math.log(spread), r.normal(0, 1, (count, 4))])
 
 
+def orders():
+    """Returns the names that --order takes, by the line that refuses another one."""
+    said = program.call("render", "x.trip", "-o", "x.png", "--order=nonsense").stderr
+    names = said.strip().rpartition("use one of ")[2].split(", ")
+    assert names[:2] == ["depth", "lists"], said
+    return names
+
+
 def options_of(view):
     """Returns the options of a view of definition.py."""
     out = ["--eye", ",".join(map(repr, map(float, view["eye"]))),

@@ -4,7 +4,6 @@ of `triptych render`."""
 import glob
 import json
 import os
-import re
 import shlex
 import shutil
 import subprocess
@@ -530,15 +529,8 @@ class View(program.ProgramTest):
         with open(f"{name}.exr", "rb") as seen, open("drawn.exr", "rb") as drawn:
             self.assertEqual(seen.read(), drawn.read(), camera)
 
-    def orders(self):
-        """Returns the names that --order takes, by the help."""
-        text = self.works("view", "--help=all").stdout.decode()
-        return re.search(r"--order=(\S+)", text)[1].split("|")
-
     def test_each_control_of_a_scene_draws_the_picture_of_render(self):
-        orders = self.orders()
-        self.assertEqual(orders[:2], ["depth", "lists"])
-        orders = ["depth", *orders[2:], "lists"]
+        orders = ["depth", *gaussians.orders()[2:], "lists"]
         controls = [f"click 0.5 Order\nclick 0.5 {name.capitalize()}" for name in orders[1:]]
         controls += ["click 0.5 Variants of the papers\nclick 0.2 Blend start (h)",
                      "click 0.5 Method\nclick 0.5 Axis", "click 0.4 Early termination",
