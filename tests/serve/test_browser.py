@@ -111,6 +111,13 @@ class Page(program.ProgramTest):
         raise AssertionError("no picture comes: " + str(self.browser.value(
             "document.getElementById('state').textContent")))
 
+    def rest(self):
+        """Waits until no more pictures come of what happened before. Returns the address."""
+        now = None
+        while now != (now := self.exact()) or not self.status()["exact"]:
+            time.sleep(0.5)
+        return now
+
     def mouse(self, kind, x, y, **more):
         self.browser.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, **more)
 
@@ -184,7 +191,7 @@ class InBrowser(Page):
         return shown
 
     def test_drags_keys_and_functions_change_the_picture(self):
-        before = self.exact()
+        before = self.rest()
         cameras = [self.status()["camera"]]
 
         def changed():

@@ -439,6 +439,31 @@ static void a_slow_picture_of_a_scene_grows_from_front_to_back(void **state)
     assert_true(s.sum[0] < 0.6 * s.sum[parts - 1]);
 }
 
+static void a_part_of_a_picture_has_no_statistics(void **state)
+{
+    (void)state;
+    char path[64];
+    triptych *t;
+    float *rgba;
+    triptych_frame_stats stats;
+    triptych_view view = scene_view;
+    view.width = view.height = 40;
+    brick_scene("part", 5000, path);
+    assert_int_equal(triptych_create(&t), 0);
+    assert_int_equal(triptych_open(t, path, NULL), 0);
+    assert_int_equal(triptych_new_picture(t, 40, 40, 4, &rgba), 0);
+    assert_int_equal(triptych_set_view(t, &view), 0);
+    assert_int_equal(triptych_begin(t), 0);
+    assert_int_equal(triptych_step(t, 0), TRIPTYCH_STEP_MORE);
+    assert_int_equal(triptych_picture(t, rgba), 0);
+    assert_int_equal(triptych_get_frame_stats(t, &stats), TRIPTYCH_USAGE);
+    assert_int_equal(triptych_step(t, UINT64_MAX), TRIPTYCH_STEP_DONE);
+    assert_int_equal(triptych_picture(t, rgba), 0);
+    assert_int_equal(triptych_get_frame_stats(t, &stats), 0);
+    assert_int_equal(stats.splats, 5000);
+    triptych_destroy(t);
+}
+
 static void a_scene_is_described_and_drawn_as_by_the_library(void **state)
 {
     (void)state;
@@ -452,7 +477,7 @@ static void a_scene_is_described_and_drawn_as_by_the_library(void **state)
     copy c = take(f);
     assert_drawn_alike(&c, path, &w);
     assert_true(trip_frames_take_opened(f, &o));
-    assert_true(o.first && o.is_scene && o.scene.gaussians == 500 && !o.scene.y_down == 0);
+    assert_true(o.first && o.is_scene && o.scene.gaussians == 500 && o.scene.y_down);
     assert_true(!o.function && o.histogram.total == 0 && o.info.lo[0] < -0.9 && o.info.hi[0] > 0.9);
     trip_opened_free(&o);
     /* Parts that a scene lacks are left out. */
@@ -489,6 +514,7 @@ int main(void)
         cmocka_unit_test(frames_can_be_stopped_at_any_moment),
         cmocka_unit_test(a_pixel_of_the_picture_can_be_probed),
         cmocka_unit_test(a_slow_picture_of_a_scene_grows_from_front_to_back),
+        cmocka_unit_test(a_part_of_a_picture_has_no_statistics),
         cmocka_unit_test(a_scene_is_described_and_drawn_as_by_the_library),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
