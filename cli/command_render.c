@@ -127,7 +127,7 @@ static int check_input(const drawing *d)
 {
     const render_options *o = &d->o;
     const bool is_scene = triptych_is_gaussians(d->t, o->input) != 0;
-    int status = draw_settings_check_kind(&o->settings, is_scene);
+    int status = library_check_kind(d->t, o->input, &o->settings, &o->resources, &o->function);
     if (!status && is_scene && o->more_count)
         status = trip_option_fail(o->input, "is a Gaussian scene; give one scene at a time");
     if (!status && is_scene && o->quality.error > 0)

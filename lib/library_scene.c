@@ -53,11 +53,12 @@ int triptych_get_scene(triptych *t, triptych_scene *out)
         .bytes = t->scene->bytes,
         .notes = t->scene->text,
     };
+    const trip_view_object object = trip_context_scene_object(t);
     for (int a = 0; a < 3; a++) {
         out->lo[a] = h->centre_lo[a];
         out->hi[a] = h->centre_hi[a];
-        out->typical_lo[a] = h->typical_lo[a];
-        out->typical_hi[a] = h->typical_hi[a];
+        out->typical_lo[a] = object.lo[a];
+        out->typical_hi[a] = object.hi[a];
         out->bricks += h->brick_count[a];
     }
     return trip_context_leave(before, 0);
@@ -88,20 +89,6 @@ trip_view_object trip_context_scene_object(const triptych *t)
 }
 
 /* ---- frames ---- */
-
-static int check(const triptych *t, bool *reference)
-{
-    const triptych_renderer r = t->resources.renderer;
-    *reference = r == TRIPTYCH_RENDERER_REFERENCE;
-    if (r == TRIPTYCH_RENDERER_INTEGRAL)
-        return trip_fail(TRIP_USAGE, "render", t->name,
-                         "is a Gaussian scene; use --renderer cpu, gl or reference");
-    if (t->given.splat.footprint == TRIPTYCH_FOOTPRINT_FIXED)
-        return trip_option_fail("--kernel", "fixed does not apply to Gaussian scenes");
-    if (t->given.all.method == TRIPTYCH_METHOD_IMAGE)
-        return trip_option_fail("--method", "image does not apply to Gaussian scenes");
-    return draw_settings_check_kind(&t->given, true);
-}
 
 static int make_camera(triptych *t, int side)
 {
@@ -176,11 +163,11 @@ static const trip_tile_device *device_of(const triptych *t)
 
 int trip_context_begin_scene(triptych *t)
 {
-    bool reference;
+    const bool reference = t->resources.renderer == TRIPTYCH_RENDERER_REFERENCE;
     const int side = t->given.all.samples > 0 ? t->given.all.samples : 1;
     int status = trip_context_check_idle(t, true);
     if (!status)
-        status = check(t, &reference);
+        status = draw_settings_check_kind(&t->given, &t->resources, true);
     if (!status && !t->has_view)
         status = trip_context_find_view(t, &(triptych_view){ 0 });
     if (!status && !t->renderer) /* lends its threads */
@@ -209,6 +196,7 @@ int trip_context_begin_scene(triptych *t)
     };
     status = trip_gaussian_frame_begin(&t->scene_frame, &params);
     t->begun = t->drawn = !status;
+    t->scene_done = false;
     if (status)
         trip_context_end_scene(t);
     return status;
@@ -243,6 +231,28 @@ static triptych_frame_stats stats_of(const triptych *t)
     };
 }
 
+/* Drawing reports its progress in steps of this time. */
+enum { REPORT_NS = 50000000 };
+
+int trip_context_step_scene(triptych *t, uint64_t deadline_ns)
+{
+    int status = TRIP_FRAME_MORE;
+    while (status == TRIP_FRAME_MORE) {
+        const uint64_t next_ns = trip_now_ns() + REPORT_NS;
+        const bool reports = t->show && next_ns < deadline_ns;
+        status = trip_gaussian_frame_step(t->scene_frame, reports ? next_ns : deadline_ns);
+        if (t->show && status >= 0) {
+            const uint64_t all = t->scene->header.records;
+            const double done = trip_gaussian_frame_get_stats(t->scene_frame).done;
+            trip_context_show_stage(t, "splat", (uint64_t)(done * (double)all), all);
+        }
+        if (!reports)
+            break;
+    }
+    t->scene_done = status == TRIP_FRAME_DONE;
+    return status;
+}
+
 int trip_context_take_scene(triptych *t, float *rgba, float *depth)
 {
     const int side = t->drawn_settings.samples;
@@ -253,7 +263,7 @@ int trip_context_take_scene(triptych *t, float *rgba, float *depth)
     if (!status && t->given.all.normalise)
         trip_normalise(rgba, (size_t)t->turned.width * (size_t)t->turned.height,
                        t->settings.background);
-    if (!status) {
+    if (!status && t->scene_done) {
         const trip_renderer *r = draws_by_gl(t) ? t->device_renderer : t->renderer;
         snprintf(t->device, sizeof t->device, "%s", r->ops->device(r));
         t->stats = stats_of(t);

@@ -93,7 +93,7 @@ TRIPTYCH_API void triptych_set_messages(triptych *t, triptych_message_callback t
  * calling thread. NULL, the default, reports no progress. Drawing has
  * these stages; triptych_brick.h lists the stages of bricking.
  * - "draw": voxels, in post
- * - "splat": splats, in pre
+ * - "splat": splats, in pre; Gaussians, in scenes
  * - "count": splats, with triptych_settings.count_exactly
  * - "integrate": pixels, with the integral renderer */
 TRIPTYCH_API void triptych_set_progress(triptych *t, triptych_progress_callback show, void *user);
@@ -216,7 +216,8 @@ typedef struct triptych_scene {
     int flat;                   /* surfels: each has no thickness along one axis */
     int y_down;                 /* the scene's y axis points down */
     double lo[3], hi[3];        /* bounds of all centres */
-    /* Bounds of the centres without the outer 1 % on each side. Views fit these. */
+    /* Bounds of the centres without the outer 1 % on each side; if these are a point, bounds of the
+     * Gaussians. Views fit these. */
     double typical_lo[3], typical_hi[3];
     const char *notes; /* JSON; belongs to the data set */
 } triptych_scene;
@@ -604,7 +605,8 @@ typedef struct triptych_settings {
     triptych_interpolation interpolation;
     triptych_show show; /* not with the integral, which has no lists and no levels */
     /* Merge: weight at which layers begin to blend, 0 (TRIPTYCH_ZERO) to below 1. The default is
-     * 0.85 for pre and 0.99 for post. */
+     * 0.85 for pre and 0.99 for post. A scene drawn by depth has one layer, and refuses h and
+     * `method`. */
     double h;
     /* Transmittance below which a pixel takes no more samples or splats: 0 (TRIPTYCH_ZERO, never)
      * to 0.1. No component of a pixel changes by more than this number. The default is 1/8192 for

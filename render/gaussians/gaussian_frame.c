@@ -36,9 +36,10 @@ struct trip_gaussian_frame {
     layer layers[LAYERS_MAX];
     unsigned layer_count, drawn; /* layers; those that are complete */
     source sources[WAYS];
-    unsigned source_count; /* of the layer that is drawn; 0 until its streams are open */
-    trip_gaussian *batch;  /* in order, of all sources */
-    float *picture;        /* of one layer, with distances behind it; NULL for one layer */
+    unsigned source_count;  /* of the layer that is drawn; 0 until its streams are open */
+    uint64_t planned, seen; /* Gaussians in the streams of this layer; those drawn */
+    trip_gaussian *batch;   /* in order, of all sources */
+    float *picture;         /* of one layer, with distances behind it; NULL for one layer */
     trip_gaussian_frame_stats stats;
 };
 
@@ -197,6 +198,7 @@ static int open_stream(trip_gaussian_frame *f, const trip_gaussian_stream_params
         return status;
     const trip_gaussian_plan *plan = trip_gaussian_stream_planned(*out);
     f->stats.bricks += plan->bricks;
+    f->planned += plan->records;
     if (plan->window_records > f->stats.window_records)
         f->stats.window_records = plan->window_records;
     f->sources[f->source_count].at = f->sources[f->source_count].count = 0;
@@ -217,6 +219,7 @@ static int open_streams(trip_gaussian_frame *f, const layer *l)
         .degree = f->params.settings.degree,
     };
     f->source_count = 0;
+    f->planned = f->seen = 0;
     if (!f->params.by_lists) {
         p.key = key_of_depth(c);
         return open_stream(f, &p);
@@ -306,6 +309,15 @@ int trip_gaussian_frame_begin(trip_gaussian_frame **out, const trip_gaussian_fra
     return status;
 }
 
+/* Two streams of a layer plan some bricks twice, and may leave out some of their Gaussians. */
+static double share_done(const trip_gaussian_frame *f)
+{
+    const double all = (double)f->params.set->header.records;
+    const double planned = fmin((double)f->planned, all);
+    const double part = planned > 0 ? fmin((double)f->seen / planned, 1) : 0;
+    return (f->drawn + part) / f->layer_count;
+}
+
 /* Draws one batch. Opens the streams of the next layer once a layer is complete. */
 static int draw_batch(trip_gaussian_frame *f)
 {
@@ -322,12 +334,16 @@ static int draw_batch(trip_gaussian_frame *f)
         status = end_layer(l);
     f->stats.draw_ms += trip_now_ms() - begun;
     f->stats.gaussians += count;
+    f->seen += count;
+    f->stats.done = share_done(f);
     if (status || count)
         return status;
     for (unsigned i = 0; i < f->source_count; i++)
         f->stats.bytes_read += trip_gaussian_stream_planned(f->sources[i].stream)->read_bytes;
     close_streams(f);
     f->drawn++;
+    f->planned = f->seen = 0;
+    f->stats.done = share_done(f);
     return 0;
 }
 

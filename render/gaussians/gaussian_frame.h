@@ -37,6 +37,7 @@ typedef struct trip_gaussian_frame_stats {
     uint64_t bricks, bytes_read;
     uint64_t window_records; /* room in the largest window */
     unsigned layers;
+    double done; /* share of the frame, 0 to 1 */
     double draw_ms, read_ms, merge_ms;
 } trip_gaussian_frame_stats;
 

@@ -52,6 +52,14 @@ def many(count, spread=1.0, seed=1, degree=0):
         r.uniform(-4.5, -2.5, (count, 3)) + math.log(spread), r.normal(0, 1, (count, 4))])
 
 
+def orders():
+    """Returns the names that --order takes, by the line that refuses another one."""
+    said = program.call("render", "x.trip", "-o", "x.png", "--order=nonsense").stderr
+    names = said.strip().rpartition("use one of ")[2].split(", ")
+    assert names[:2] == ["depth", "lists"], said
+    return names
+
+
 def options_of(view):
     """Returns the options of a view of definition.py."""
     out = ["--eye", ",".join(map(repr, map(float, view["eye"]))),
@@ -385,13 +393,21 @@ class Gaussians(program.ProgramTest):
             file.write(bytes([byte[0] ^ 1]))
         self.fails(1, "info", "--verify", data)
 
+    def test_bench_flies_through_a_scene(self):
+        data = self.scene("flown", many(300))
+        report = json.loads(self.works("bench", "flight", data, "--seconds", "0.4", "--size", "90x60", "--json").stdout)
+        self.assertEqual(report["settings"]["gaussians"], 300)
+        rest, = report["tables"]["rest"]["rows"]
+        self.assertEqual(rest["differ"], 0)
+        self.assertGreater(rest["first_ms"], 0)
+        self.fails(2, "bench", "flight", data, "--tf", "bone", "--seconds", "0.1")
+
     # ---- refusals ----
 
     def test_commands_for_volumes_refuse_scenes(self):
         data = self.scene("refused", [row((0, 0, 0))])
         for name in data, "refused.ply":
-            for command in ("view", name), ("serve", name), ("accuracy", name, "-o", "r"), \
-                           ("bench", "stream", name):
+            for command in ("accuracy", name, "-o", "r"), ("bench", "stream", name):
                 self.leaves_nothing(2, *command,
                                     says=f"{name}: is a Gaussian scene; `triptych render` draws it")
         self.fails(2, "render", data, data, "-o", "a.png", says="give one scene at a time")
@@ -406,6 +422,14 @@ class Gaussians(program.ProgramTest):
             self.leaves_nothing(2, "render", data, "-o", "a.png", *options)
         self.leaves_nothing(2, "render", "settings.ply", "-o", "a.png", "--spacing", "1,1,1",
                             says="does not apply to Gaussian scenes")
+        for options, says in ((["--clip-box", "voxels:0,0,0,1,1,1"], "--clip-box: voxels: does not apply"),
+                              (["--h", "0.5"], "--h: does not apply to scenes with --order depth"),
+                              (["--method", "clip", "--order", "depth"], "--method: does not apply to scenes"),
+                              (["--engine", "null"], "--engine: must be pread"),
+                              (["--engine", "io_uring"], "--engine: must be pread"),
+                              (["--occluded", "draw"], "--occluded: does not apply")):
+            for name in data, "settings.ply":
+                self.leaves_nothing(2, "render", name, "-o", "a.png", *options, says=says)
 
     def test_settings_of_scenes_are_refused_for_volumes(self):
         tooth = os.path.join(program.DATASETS, "tooth.nhdr")
