@@ -316,7 +316,7 @@ int draw_settings_check(const draw_settings *s, triptych_renderer *renderer, boo
 static const uint64_t of_scenes = ROW(ORDER) | ROW(HARMONICS);
 static const uint64_t of_both = ROW(BACKGROUND) | ROW(CLIP_BOX) | ROW(CLIP_PLANE) |
                                 ROW(EARLY_TERMINATION) | ROW(FOOTPRINT) | ROW(SAMPLES) |
-                                ROW(DEPTH) | ROW(NORMALISE) | ROW(METHOD) | ROW(H);
+                                ROW(DEPTH) | ROW(NORMALISE) | ROW(METHOD) | ROW(H) | ROW(LOD);
 
 /* A scene does not have these choices, for these reasons. */
 static const struct choice {

@@ -90,6 +90,9 @@ trip_view_object trip_context_scene_object(const triptych *t)
 
 /* ---- frames ---- */
 
+/* Gaussians wider than a pixel are drawn as they are. */
+#define DEFAULT_LOD_PX 1.0
+
 static int make_camera(triptych *t, int side)
 {
     const trip_affine identity = trip_affine_identity();
@@ -161,6 +164,13 @@ static const trip_tile_device *device_of(const triptych *t)
     return t->device_renderer ? t->device_renderer->ops->tile_device(t->device_renderer) : NULL;
 }
 
+/* Returns the width of voxels in pixels that coarse Gaussians may stand for. */
+static double lod_of(const triptych *t)
+{
+    const double given = t->given.lod.voxel_px;
+    return given == TRIPTYCH_ZERO ? 0 : given > 0 ? given : DEFAULT_LOD_PX;
+}
+
 int trip_context_begin_scene(triptych *t)
 {
     const bool reference = t->resources.renderer == TRIPTYCH_RENDERER_REFERENCE;
@@ -188,6 +198,7 @@ int trip_context_begin_scene(triptych *t)
         .set = t->scene,
         .camera = &t->camera,
         .settings = settings_of(t),
+        .lod_px = lod_of(t) * side,
         .by_lists = t->given.scene.order == TRIPTYCH_ORDER_LISTS ? &t->drawn_settings : NULL,
         .reference = reference,
         .device = device_of(t),
@@ -213,6 +224,7 @@ static triptych_frame_stats stats_of(const triptych *t)
         .draw_ms = s.draw_ms,
         .merge_ms = s.merge_ms,
         .splats = s.gaussians,
+        .lod_px = lod_of(t),
         .bytes_read = s.bytes_read,
         .reads = s.bricks,
         .memory_bytes = trip_budget_limit_bytes(t->session.budget),

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "clock.h"
+#include "gaussian_footprint.h"
 #include "gaussians_cpu.h"
 #include "gaussians_reference.h"
 #include "normalise.h"
@@ -190,6 +191,20 @@ static trip_gaussian_key key_of_depth(const trip_camera *c)
     return key;
 }
 
+/* A length covers the most pixels in the corners of the picture. */
+static trip_gaussian_lod lod_of(const trip_gaussian_frame *f)
+{
+    const trip_camera *c = f->params.camera;
+    const trip_gaussian_view v = view_of(c);
+    trip_gaussian_lod lod = { .voxel_px = f->params.lod_px,
+                              .eye = { v.eye[0], v.eye[1], v.eye[2] },
+                              .parallel = c->ortho,
+                              .px = c->height / (2 * v.half_height) };
+    if (!c->ortho)
+        lod.px *= sqrt(1 + v.half_width * v.half_width + v.half_height * v.half_height);
+    return lod;
+}
+
 static int open_stream(trip_gaussian_frame *f, const trip_gaussian_stream_params *params)
 {
     trip_gaussian_stream **out = &f->sources[f->source_count].stream;
@@ -199,6 +214,7 @@ static int open_stream(trip_gaussian_frame *f, const trip_gaussian_stream_params
     const trip_gaussian_plan *plan = trip_gaussian_stream_planned(*out);
     f->stats.bricks += plan->bricks;
     f->planned += plan->records;
+    f->stats.coarse += plan->coarse_records;
     if (plan->window_records > f->stats.window_records)
         f->stats.window_records = plan->window_records;
     f->sources[f->source_count].at = f->sources[f->source_count].count = 0;
@@ -216,6 +232,7 @@ static int open_streams(trip_gaussian_frame *f, const layer *l)
         .axis = l->axis,
         .planes = planes,
         .plane_count = find_planes(c, planes),
+        .lod = lod_of(f),
         .degree = f->params.settings.degree,
     };
     f->source_count = 0;
@@ -245,10 +262,21 @@ static void close_streams(trip_gaussian_frame *f)
     f->source_count = 0;
 }
 
-static int fill(source *s)
+/* Gaussians of coarse levels keep their mass when they are smaller than a pixel. */
+static void compensate(const trip_gaussian_frame *f, trip_gaussian *g)
+{
+    const trip_gaussian_settings *s = &f->params.settings;
+    if (g->merged && !s->antialiased && s->shape != TRIP_GAUSSIAN_EWA)
+        g->opacity *= (float)trip_gaussian_compensation(f->params.camera, g);
+}
+
+static int fill(const trip_gaussian_frame *f, source *s)
 {
     s->at = s->count = 0;
-    return trip_gaussian_stream_next(s->stream, s->batch, s->keys, BATCH, &s->count);
+    const int status = trip_gaussian_stream_next(s->stream, s->batch, s->keys, BATCH, &s->count);
+    for (size_t i = 0; i < s->count; i++)
+        compensate(f, &s->batch[i]);
+    return status;
 }
 
 static bool has_any(const source *s)
@@ -261,9 +289,9 @@ static int take_batch(trip_gaussian_frame *f, const trip_gaussian **batch, size_
 {
     const double begun = trip_now_ms();
     source *a = &f->sources[0], *b = &f->sources[1];
-    int status = has_any(a) ? 0 : fill(a);
+    int status = has_any(a) ? 0 : fill(f, a);
     if (!status && f->source_count > 1 && !has_any(b))
-        status = fill(b);
+        status = fill(f, b);
     if (status || f->source_count == 1) {
         *batch = a->batch;
         *count = status ? 0 : a->count;

@@ -101,7 +101,7 @@ static int open_plane(trip_gaussian_set *s, int folder, int axis, unsigned plane
 {
     char name[32], where[WHERE_BYTES];
     uint64_t bytes = 0;
-    const uint64_t wanted = s->header.records * trip_gaussian_plane_bytes(plane);
+    const uint64_t wanted = s->header.list_records * trip_gaussian_plane_bytes(plane);
     trip_gaussian_plane_name(axis, plane, name);
     const int status = open_file(s, folder, name, &s->lists[axis].fd[plane], &bytes);
     if (status < 0)
@@ -125,6 +125,7 @@ static int open_files(trip_gaussian_set *s, int folder)
         return status;
     unsigned char *index = s->memory;
     s->text = (char *)index + s->header.text_offset;
+    s->nodes = (const void *)(index + s->header.nodes_offset);
     for (int a = 0; a < 3; a++) {
         s->lists[a].bricks = (const void *)(index + s->header.bricks_offset[a]);
         s->lists[a].brick_count = s->header.brick_count[a];

@@ -9,8 +9,8 @@
 #include "budget.h"
 #include "gaussian_format.h"
 
-/* The records in the order of one axis. Bricks stand by ascending class of size. The bricks of a
- * class stand by slabs of ascending coordinate. */
+/* The records in the order of one axis. Bricks stand by node. The bricks of a node stand by
+ * ascending class of size, then by slabs of ascending coordinate. */
 typedef struct trip_gaussian_list {
     const trip_file_gaussian_brick *bricks;
     uint64_t brick_count;
@@ -20,6 +20,7 @@ typedef struct trip_gaussian_list {
 typedef struct trip_gaussian_set {
     char *path;
     trip_file_gaussian_header header;
+    const trip_file_gaussian_node *nodes;
     trip_gaussian_list lists[3]; /* along X, Y, Z */
     char *text;                  /* JSON, null-terminated */
     uint64_t bytes;              /* of all files */

@@ -24,6 +24,8 @@ enum {
 typedef struct step {
     double lo, hi; /* bounds of the keys */
     uint64_t brick;
+    float share; /* of the optical depth of its splats */
+    bool is_coarse;
 } step;
 
 /* A splat in the window. The bytes of the record and of its coefficients follow. */
@@ -140,6 +142,60 @@ static bool is_wanted(const trip_gaussian_stream_params *p, const trip_file_gaus
     return true;
 }
 
+/* Returns the share of a node that has nodes inside it: 0 if its voxels are too wide, 1 if they are
+ * narrower by a quarter of an octave. */
+static double share_of(const trip_gaussian_lod *lod, const trip_file_gaussian_node *n)
+{
+    const double octaves = 0.25;
+    double square = 0;
+    if (!(lod->voxel_px > 0))
+        return 0;
+    for (int a = 0; a < 3; a++) {
+        const double away = fmax(0, fmax(n->lo[a] - lod->eye[a], lod->eye[a] - n->hi[a]));
+        square += away * away;
+    }
+    const double width = n->width * lod->px / (lod->parallel ? 1 : sqrt(square));
+    return width < lod->voxel_px ? fmin(1, log2(lod->voxel_px / width) / octaves) : 0;
+}
+
+bool trip_gaussian_walk_next(const trip_gaussian_set *set, const trip_gaussian_lod *lod,
+                             trip_gaussian_walk *walk)
+{
+    while (walk->next < set->header.node_count) {
+        const trip_file_gaussian_node *n = &set->nodes[walk->next];
+        const double rest = walk->next < walk->end ? walk->rest : 1;
+        const double share = n->nodes > 1 ? share_of(lod, n) : 1;
+        walk->node = walk->next;
+        walk->next += share < 1 && rest == 1 ? 1 : share > 0 ? n->nodes : 1;
+        walk->share = rest < 1 ? rest : share;
+        if (!(share > 0))
+            continue;
+        if (share < 1 && rest == 1) {
+            walk->end = walk->node + n->nodes;
+            walk->rest = 1 - share;
+        }
+        return true;
+    }
+    return false;
+}
+
+/* Adds the bricks of a node that are wanted. */
+static void add_node(steps *s, step *found, trip_key *keys, const trip_gaussian_set *set,
+                     const trip_gaussian_stream_params *p, const trip_gaussian_walk *walk)
+{
+    const trip_file_gaussian_node *n = &set->nodes[walk->node];
+    const uint64_t first = n->first_brick[p->axis];
+    for (uint64_t i = first; i < first + n->brick_count[p->axis]; i++) {
+        const trip_file_gaussian_brick *b = &set->lists[p->axis].bricks[i];
+        const step here = { corner_key(&p->key, b, false), corner_key(&p->key, b, true), i,
+                            (float)walk->share, n->nodes > 1 };
+        if (!is_wanted(p, b, &here))
+            continue;
+        keys[s->count] = (trip_key){ trip_key_of(here.lo), s->count };
+        found[s->count++] = here;
+    }
+}
+
 /* Finds the bricks to read and sorts them by their least keys. */
 static int make_steps(steps *s, const trip_gaussian_set *set, const trip_gaussian_stream_params *p,
                       trip_budget *budget)
@@ -156,14 +212,9 @@ static int make_steps(steps *s, const trip_gaussian_set *set, const trip_gaussia
     s->sorted = (void *)s->memory;
     step *found = s->sorted + room;
     trip_key *keys = (void *)(found + room), *scratch = keys + room;
-    for (uint64_t i = 0; i < room; i++) {
-        const trip_file_gaussian_brick *b = &list->bricks[i];
-        const step here = { corner_key(&p->key, b, false), corner_key(&p->key, b, true), i };
-        if (!is_wanted(p, b, &here))
-            continue;
-        keys[s->count] = (trip_key){ trip_key_of(here.lo), s->count };
-        found[s->count++] = here;
-    }
+    trip_gaussian_walk walk = { 0 };
+    while (trip_gaussian_walk_next(set, &p->lod, &walk))
+        add_node(s, found, keys, set, p, &walk);
     trip_key_sort(keys, scratch, s->count);
     for (uint64_t i = 0; i < s->count; i++)
         s->sorted[i] = found[keys[i].number];
@@ -241,8 +292,11 @@ static uint64_t whole_pages(uint64_t bytes)
 static trip_gaussian_plan plan_of(const steps *s, const trip_gaussian_list *list, int degree)
 {
     trip_gaussian_plan plan = { .bricks = s->count, .window_records = window_of(s, list) };
-    for (uint64_t i = 0; i < s->count; i++)
-        plan.records += list->bricks[s->sorted[i].brick].records;
+    for (uint64_t i = 0; i < s->count; i++) {
+        const uint32_t records = list->bricks[s->sorted[i].brick].records;
+        plan.records += records;
+        plan.coarse_records += s->sorted[i].is_coarse ? records : 0;
+    }
     for (int n = 0; n <= degree; n++)
         plan.read_bytes += plan.records * trip_gaussian_plane_bytes((unsigned)n);
     plan.bytes = whole_pages(s->bytes) + whole_pages(memory_of(s, plan.window_records, degree));
@@ -500,6 +554,10 @@ static void deliver(trip_gaussian_stream *s, trip_gaussian *out, double *key)
     const unsigned char *record = (const unsigned char *)(from + 1);
     trip_gaussian_decode(&s->list->bricks[s->steps.sorted[from->brick].brick], record,
                          record + TRIP_GAUSSIAN_RECORD_BYTES, s->degree, out);
+    const step *of = &s->steps.sorted[from->brick];
+    out->merged = of->is_coarse;
+    if (of->share < 1)
+        out->opacity = 1 - powf(1 - fminf(out->opacity, 0.99f), of->share);
     if (key)
         *key = from->key;
     release_slot(s, at);

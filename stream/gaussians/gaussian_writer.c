@@ -22,6 +22,7 @@ struct trip_gaussian_writer {
     int axis; /* of the open outputs; -1 before the first */
     trip_output planes[TRIP_GAUSSIAN_PLANES];
     trip_output bricks; /* unnamed, of all lists */
+    trip_file_gaussian_node *nodes;
     uint64_t records[3];
     unsigned char *codes; /* a brick in all planes */
     size_t codes_bytes;
@@ -123,7 +124,41 @@ static void include(trip_file_gaussian_header *h, const trip_file_gaussian_brick
     }
 }
 
-int trip_gaussian_writer_append(trip_gaussian_writer *w, int axis, int size_class,
+void trip_gaussian_writer_set_nodes(trip_gaussian_writer *w, trip_file_gaussian_node *nodes,
+                                    uint64_t count)
+{
+    w->nodes = nodes;
+    w->header.node_count = count;
+}
+
+static void add_to_node(trip_file_gaussian_header *h, trip_file_gaussian_node *n, int axis,
+                        const trip_file_gaussian_brick *b)
+{
+    const bool first = axis == 0 && n->brick_count[axis] == 0;
+    for (int a = 0; a < 3; a++) {
+        n->lo[a] = first ? b->centre_lo[a] : fmin(n->lo[a], b->centre_lo[a]);
+        n->hi[a] = first ? b->centre_hi[a] : fmax(n->hi[a], b->centre_hi[a]);
+    }
+    if (n->brick_count[axis]++ == 0)
+        n->first_brick[axis] = h->brick_count[axis];
+    if (axis == 0 && n->nodes == 1)
+        h->records += b->records;
+}
+
+/* Widens each node by the nodes inside it. They follow it. */
+static void widen_nodes(trip_gaussian_writer *w)
+{
+    for (uint64_t i = w->header.node_count; i-- > 0;) {
+        trip_file_gaussian_node *n = &w->nodes[i];
+        for (uint64_t j = i + 1; j < i + n->nodes; j += w->nodes[j].nodes)
+            for (int a = 0; a < 3; a++) {
+                n->lo[a] = fmin(n->lo[a], w->nodes[j].lo[a]);
+                n->hi[a] = fmax(n->hi[a], w->nodes[j].hi[a]);
+            }
+    }
+}
+
+int trip_gaussian_writer_append(trip_gaussian_writer *w, int axis, uint64_t node, int size_class,
                                 const unsigned char *const *splats, unsigned count)
 {
     unsigned char *planes[TRIP_GAUSSIAN_PLANES] = { w->codes };
@@ -138,6 +173,7 @@ int trip_gaussian_writer_append(trip_gaussian_writer *w, int axis, int size_clas
                                     count * (size_t)trip_gaussian_plane_bytes(n));
     include(&w->header, &b);
     w->records[axis] += count;
+    add_to_node(&w->header, &w->nodes[node], axis, &b);
     w->header.brick_count[axis]++;
     return status == TRIP_OK ? trip_output_append(&w->bricks, &b, sizeof b) : status;
 }
@@ -150,9 +186,13 @@ static int append_index(trip_gaussian_writer *w, trip_output *index)
     if (!hash)
         return trip_fail(TRIP_ERROR, "brick", w->folder.path, "out of memory");
     XXH64_reset(hash, 0);
+    const size_t nodes_bytes = h->node_count * sizeof *w->nodes;
     int status = trip_output_flush(&w->bricks);
     if (status == TRIP_OK)
         status = trip_output_append(index, h, sizeof *h); /* replaced below */
+    if (status == TRIP_OK)
+        status = trip_output_append(index, w->nodes, nodes_bytes);
+    XXH64_update(hash, w->nodes, nodes_bytes);
     for (uint64_t at = 0; at < w->bricks.bytes && status == TRIP_OK;) {
         const uint64_t left = w->bricks.bytes - at;
         const size_t bytes = left < sizeof piece ? (size_t)left : sizeof piece;
@@ -182,7 +222,9 @@ static void complete_header(trip_gaussian_writer *w, const double lo[3], const d
     memcpy(h->magic, TRIP_GAUSSIAN_MAGIC, sizeof h->magic);
     h->version = TRIP_GAUSSIAN_VERSION;
     h->header_bytes = TRIP_GAUSSIAN_HEADER_BYTES;
-    h->records = w->records[0];
+    h->list_records = w->records[0];
+    h->nodes_offset = at;
+    at += h->node_count * sizeof(trip_file_gaussian_node);
     for (int a = 0; a < 3; a++) {
         h->bricks_offset[a] = at;
         at += h->brick_count[a] * sizeof(trip_file_gaussian_brick);
@@ -198,6 +240,7 @@ int trip_gaussian_writer_finish(trip_gaussian_writer *w, const double typical_lo
                                 const double typical_hi[3])
 {
     trip_output index = { .fd = -1 };
+    widen_nodes(w);
     complete_header(w, typical_lo, typical_hi);
     int status = finish_planes(w);
     if (status == TRIP_OK)

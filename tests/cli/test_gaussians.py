@@ -416,7 +416,7 @@ class Gaussians(program.ProgramTest):
 
     def test_settings_of_volumes_are_refused_for_scenes(self):
         data = self.scene("settings", [row((0, 0, 0))])
-        for options in ("--lod", "1"), ("--interpolation", "cubic"), ("--compositing", "sheet"), \
+        for options in ("--max-bytes", "1M"), ("--interpolation", "cubic"), ("--compositing", "sheet"), \
                        ("--error", "1"), ("--kernel", "fixed"), ("--tf", "bone"), \
                        ("--effects", "shadows"), ("--renderer", "integral"):
             self.leaves_nothing(2, "render", data, "-o", "a.png", *options)
