@@ -46,6 +46,7 @@ int triptych_get_scene(triptych *t, triptych_scene *out)
     const trip_file_gaussian_header *h = &t->scene->header;
     *out = (triptych_scene){
         .gaussians = h->records,
+        .coarse = h->list_records - h->records,
         .degree = (int)h->degree,
         .antialiased = h->flags & TRIP_GAUSSIAN_ANTIALIASED,
         .flat = (h->flags & TRIP_GAUSSIAN_FLAT) != 0,
@@ -306,6 +307,11 @@ void trip_context_explain_scene(const triptych *t, FILE *out)
     else
         fprintf(out, "order       by depth: at most %llu Gaussians wait in the window\n",
                 (unsigned long long)s.window_records);
+    if (lod_of(t) > 0)
+        fprintf(out, "levels      coarse Gaussians for voxels of at most %g pixels: %llu of %llu\n",
+                lod_of(t), (unsigned long long)s.coarse, (unsigned long long)s.planned);
+    else
+        fprintf(out, "levels      the Gaussians of the scene alone\n");
     fprintf(out, "footprint   %s%s\n",
             settings.shape == TRIP_GAUSSIAN_EXACT ? "exact, along each pixel's ray"
             : settings.shape == TRIP_GAUSSIAN_EWA ? "EWA, projected at the centre without limits"

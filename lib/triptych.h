@@ -209,7 +209,8 @@ TRIPTYCH_API int triptych_get_info(triptych *t, triptych_info *out);
 
 /* An open data set of a Gaussian scene. Lengths are in units of the scene. */
 typedef struct triptych_scene {
-    uint64_t gaussians, bricks; /* bricks of the three lists */
+    uint64_t gaussians, bricks; /* bricks of the three lists, with those of coarse levels */
+    uint64_t coarse;            /* Gaussians of coarse levels, not in `gaussians` */
     uint64_t bytes;             /* of all files */
     int degree;                 /* of the spherical harmonics, 0 to 3 */
     int antialiased;            /* trained with opacities that make up for the blur of pixels */
@@ -503,7 +504,8 @@ typedef struct triptych_integral_settings {
 typedef struct triptych_lod_settings {
     /* Each part of the picture is drawn at the coarsest level with voxels at most this many pixels
      * wide, up to 1000. TRIPTYCH_ZERO draws the finest level only. By default (0 or -2), post
-     * chooses by the quality, and pre draws the finest level. */
+     * chooses by the quality, and pre draws the finest level. For Gaussian scenes the default is
+     * 1. */
     double voxel_px;
     /* Bounds the bytes of codes and normals in view. The parts that are widest in the picture get
      * the finest levels first. Positions are not counted; they add 10 to 30 %. Never finer than

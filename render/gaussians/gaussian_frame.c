@@ -214,6 +214,7 @@ static int open_stream(trip_gaussian_frame *f, const trip_gaussian_stream_params
     const trip_gaussian_plan *plan = trip_gaussian_stream_planned(*out);
     f->stats.bricks += plan->bricks;
     f->planned += plan->records;
+    f->stats.planned += plan->records;
     f->stats.coarse += plan->coarse_records;
     if (plan->window_records > f->stats.window_records)
         f->stats.window_records = plan->window_records;
@@ -262,12 +263,15 @@ static void close_streams(trip_gaussian_frame *f)
     f->source_count = 0;
 }
 
-/* Gaussians of coarse levels keep their mass when they are smaller than a pixel. */
+/* A Gaussian of a coarse level blocks the same light as without the low-pass filter. Its opacity
+ * above 1/255 counts, since drawing leaves out the rest. */
 static void compensate(const trip_gaussian_frame *f, trip_gaussian *g)
 {
     const trip_gaussian_settings *s = &f->params.settings;
-    if (g->merged && !s->antialiased && s->shape != TRIP_GAUSSIAN_EWA)
-        g->opacity *= (float)trip_gaussian_compensation(f->params.camera, g);
+    const float least = (float)TRIP_GAUSSIAN_ALPHA_MIN;
+    if (g->merged && g->opacity > least && !s->antialiased && s->shape != TRIP_GAUSSIAN_EWA)
+        g->opacity =
+            least + (g->opacity - least) * (float)trip_gaussian_compensation(f->params.camera, g);
 }
 
 static int fill(const trip_gaussian_frame *f, source *s)

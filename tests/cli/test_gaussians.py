@@ -267,15 +267,67 @@ class Gaussians(program.ProgramTest):
             self.assertGreater(one[:, :, 3].max(), 0.4)
             self.assertLess(255 * numpy.abs(cut - one).max(), 1, order)
 
+    # ---- levels ----
+
+    def test_a_far_scene_has_the_mean_of_its_picture(self):
+        """Many rays per pixel show the mean. Each pixel of the far picture sees many Gaussians."""
+        rows = numpy.array(many(60000))
+        rows[:, 7:10] = math.log(0.012)
+        rows[:, 6] = math.log(0.06 / 0.94)  # opacity 0.06
+        data = self.scene("distant", rows)
+        for view in view_of((20, -9, 30), size=(20, 20), fov=6), \
+                view_of((20, -9, 30), size=(20, 20), ortho_height=4):
+            mean = self.picture(data, *options_of(view), "--lod", "0", "--samples", "32")
+            for options in (), ("--order", "lists"), ("--renderer", "reference"):
+                fine = self.picture(data, *options_of(view), "--lod", "0", *options)
+                coarse = self.picture(data, *options_of(view), "--lod", "1", *options)
+                apart = [255 * numpy.abs(p - mean).mean() for p in (fine, coarse)]
+                self.assertLess(apart[1], 0.25 * apart[0], options)
+                self.assertLess(apart[1], 3, options)
+                self.assertAlmostEqual(coarse[:, :, 3].mean(), mean[:, :, 3].mean(), delta=0.01)
+            drawn = [self.stats(data, *options_of(view), "--lod", lod)["frames"][0] for lod in (0, 1)]
+            self.assertLess(3 * drawn[1]["gaussians"], drawn[0]["gaussians"])
+            self.assertLess(3 * drawn[1]["bytes_read"], drawn[0]["bytes_read"])
+
+    def test_a_near_view_has_the_same_bits_with_levels(self):
+        data = self.scene("close", many(60000))
+        view = options_of(view_of((2.4, -0.9, 3), size=(200, 150)))
+        fine = self.picture(data, *view, "--lod", "0")
+        for options in (), ("--lod", "auto"), ("--lod", "1"):
+            self.assertTrue((fine == self.picture(data, *view, *options)).all())
+        self.assertFalse((fine == self.picture(data, *view, "--lod", "100")).all())
+
+    def test_samples_make_the_pixels_of_levels_smaller(self):
+        data = self.scene("sampled", many(60000))
+        view = options_of(view_of((8, -3, 14), size=(20, 20), fov=20))
+        drawn = [self.stats(data, *view, *options)["frames"][0]["gaussians"] for options in
+                 (("--lod", "1"), ("--lod", "1", "--samples", "8"), ("--lod", "0"))]
+        self.assertLess(drawn[0], drawn[2])
+        self.assertEqual(drawn[0], drawn[1])
+
+    def test_no_frame_jumps_while_the_eye_moves_away(self):
+        """Two frames 1 % apart differ by at most twice as much as without levels."""
+        data = self.scene("zoom", many(60000))
+        jumps = []
+        for lod in "0", "1":
+            frames, distance = [], 17.0
+            while distance < 26:
+                view = view_of((0.6 * distance, -0.3 * distance, 0.74 * distance), size=(80, 80), fov=30)
+                frames.append(self.picture(data, *options_of(view), "--lod", lod))
+                distance *= 1.01
+            jumps.append(max(255 * numpy.abs(a - b).mean() for a, b in zip(frames, frames[1:])))
+        self.assertLess(jumps[1], 2 * jumps[0])
+
     # ---- runs ----
 
     def test_threads_and_memory_change_no_bit(self):
-        data = self.scene("bits", many(20000))
+        data = self.scene("bits", many(60000))
         for order in "depth", "lists":
-            pictures = [self.picture(data, "--size", "150x130", "--order", order, *o)
-                        for o in ((), ("--threads", "1"), ("--threads", "5"), ("--memory", "60M"))]
-            for other in pictures[1:]:
-                self.assertTrue((pictures[0] == other).all(), order)
+            for lod in "0", "60":
+                pictures = [self.picture(data, "--size", "150x130", "--order", order, "--lod", lod, *o)
+                            for o in ((), ("--threads", "1"), ("--threads", "5"), ("--memory", "60M"))]
+                for other in pictures[1:]:
+                    self.assertTrue((pictures[0] == other).all(), order)
 
     def test_two_runs_of_brick_give_the_same_bytes(self):
         write_scene("twice.ply", many(5000))
