@@ -6,6 +6,7 @@
 #include "gaussian_levels.h"
 #include "gaussian_sort.h"
 #include "gaussian_writer.h"
+#include "harmonics_palette.h"
 #include "report.h"
 
 #include <math.h>
@@ -23,6 +24,8 @@ enum {
 /* Precision of a brick's centres: the box has 2^21 codes along an axis. A splat is large enough
  * for a box of 2^15 times its class. */
 #define BOX_CLASSES 32768.0
+/* The greatest mean error of colours by a palette that is selected by itself. */
+#define PALETTE_ERROR (0.5 / 255)
 /* A gap that divides a brick is at least this part of its box. */
 #define GAP_PART 0.25
 
@@ -48,6 +51,10 @@ typedef struct bricker {
     trip_file_gaussian_node *nodes;
     uint64_t *node_numbers; /* of the octree's nodes */
     uint64_t node_count;
+    float *vectors; /* a sample of the coefficients */
+    uint64_t vector_count, vector_room, vectors_seen;
+    trip_palette palette;
+    double palette_error;
     /* These belong to the axis that is being written. */
     int axis;
     trip_gaussian_tree tree;
@@ -377,12 +384,13 @@ static int emit_coarse(void *user, uint64_t node, const trip_gaussian *g)
 }
 
 /* Calls `use` for each splat of the spool. The buffer of bricks serves for reading too. */
-static int for_each_splat(bricker *b, int (*use)(bricker *b, const unsigned char *spilled))
+static int for_each_splat(bricker *b, uint64_t records,
+                          int (*use)(bricker *b, const unsigned char *spilled))
 {
     const uint64_t step = TRIP_GAUSSIAN_BRICK_RECORDS_MAX;
     int status = TRIP_OK;
-    for (uint64_t first = 0; first < b->records && status == TRIP_OK; first += step) {
-        const uint64_t left = b->records - first, count = left < step ? left : step;
+    for (uint64_t first = 0; first < records && status == TRIP_OK; first += step) {
+        const uint64_t left = records - first, count = left < step ? left : step;
         status = trip_output_read(&b->spool, first * b->stride, b->buffer, count * b->stride);
         for (uint64_t i = 0; i < count && status == TRIP_OK; i++)
             status = use(b, b->buffer + i * b->stride);
@@ -450,7 +458,7 @@ static int add_levels(bricker *b)
     if (status == TRIP_OK)
         status = make_output(b, &b->merged);
     if (status == TRIP_OK)
-        status = for_each_splat(b, merge_splat);
+        status = for_each_splat(b, b->records, merge_splat);
     if (status == TRIP_OK)
         status = trip_gaussian_levels_end_pass(b->levels);
     if (status == TRIP_OK)
@@ -552,6 +560,60 @@ static int make_levels(bricker *b)
     return status;
 }
 
+/* ---- palette ---- */
+
+/* Takes vector_room of all splats, at even distances. */
+static int take_vector(bricker *b, const unsigned char *spilled)
+{
+    const trip_gaussian *g = (const void *)(spilled + sizeof(trip_spilled));
+    const unsigned size = trip_palette_size(b->p->degree);
+    const double share = (double)b->vector_room / (double)(b->records + b->coarse);
+    b->vectors_seen++;
+    if (b->vector_count < (uint64_t)((double)b->vectors_seen * share + 1e-6))
+        memcpy(b->vectors + size * b->vector_count++, g->sh[1], size * sizeof *b->vectors);
+    return TRIP_OK;
+}
+
+static unsigned find_entry(const void *user, const unsigned char *splat)
+{
+    const bricker *b = user;
+    trip_gaussian g = { .opacity = 0 };
+    memcpy(&g, splat,
+           offsetof(trip_gaussian, sh) + (size_t)trip_sh_count(b->p->degree) * sizeof g.sh[0]);
+    return trip_palette_find(&b->palette, g.sh);
+}
+
+/* Makes the palette, and gives it to the writer if its error is small or the caller wants it. */
+static int make_palette(bricker *b)
+{
+    const trip_brick_harmonics how = b->p->harmonics;
+    const uint64_t all = b->records + b->coarse;
+    if (b->p->degree == 0 || how == TRIP_BRICK_HARMONICS_WHOLE)
+        return TRIP_OK;
+    b->vector_room = all < TRIP_PALETTE_SAMPLE_MAX ? all : TRIP_PALETTE_SAMPLE_MAX;
+    const size_t bytes = b->vector_room * trip_palette_size(b->p->degree) * sizeof *b->vectors;
+    b->vectors = trip_budget_take(b->budget, bytes);
+    if (!b->vectors)
+        return fail_memory(b);
+    int status = for_each_splat(b, all, take_vector);
+    if (status == TRIP_OK &&
+        !trip_palette_build(&b->palette, b->vectors, b->vector_count, b->p->degree,
+                            TRIP_GAUSSIAN_PALETTE_MAX, b->budget))
+        status = fail_memory(b);
+    trip_budget_release(b->budget, b->vectors, bytes);
+    b->palette_error = b->palette.error;
+    if (status == TRIP_OK &&
+        (how == TRIP_BRICK_HARMONICS_PALETTE || b->palette.error < PALETTE_ERROR))
+        trip_gaussian_writer_set_palette(b->writer,
+                                         &(trip_gaussian_palette){ .entries = b->palette.entries,
+                                                                   .count = b->palette.count,
+                                                                   .find = find_entry,
+                                                                   .user = b });
+    else
+        trip_palette_free(&b->palette);
+    return status;
+}
+
 /* ---- lists ---- */
 
 static void place_in_tree(void *user, const trip_gaussian *g, trip_spilled *head)
@@ -604,6 +666,8 @@ static int run_bricker(bricker *b)
         status = find_typical(b);
     if (status == TRIP_OK)
         status = make_levels(b);
+    if (status == TRIP_OK)
+        status = make_palette(b);
     for (int axis = 0; axis < 3 && status == TRIP_OK; axis++)
         status = write_axis(b, axis);
     if (status < 0)
@@ -625,6 +689,7 @@ static void free_bricker(bricker *b)
     if (b->nodes)
         trip_budget_release(b->budget, b->nodes, nodes_bytes(b));
     trip_octree_free(&b->octree);
+    trip_palette_free(&b->palette);
     free(b);
 }
 
@@ -663,7 +728,11 @@ int trip_brick_gaussians(const trip_brick_gaussians_params *params, trip_budget 
         set_room(b, room);
     const int status = room ? run_bricker(b) : fail_memory(b);
     if (result)
-        *result = (trip_brick_gaussians_result){ b->records, b->dropped };
+        *result = (trip_brick_gaussians_result){ .records = b->records,
+                                                 .coarse = b->coarse,
+                                                 .palette = b->palette.count,
+                                                 .palette_error = b->palette_error,
+                                                 .dropped = b->dropped };
     if (room)
         trip_budget_release(budget, room, room_bytes(b));
     free_bricker(b);

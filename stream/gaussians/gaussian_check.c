@@ -88,6 +88,14 @@ static int check_layout(const trip_file_gaussian_header *h, const char *where)
             return FAIL_FIELD(brick_count, "the number of bricks does not fit the file");
         at += h->brick_count[a] * sizeof(trip_file_gaussian_brick);
     }
+    const uint64_t entry = trip_gaussian_entry_bytes((int)h->degree);
+    const bool palette = h->flags & TRIP_GAUSSIAN_PALETTE;
+    if (palette != (h->palette_count > 0) || h->palette_count > TRIP_GAUSSIAN_PALETTE_MAX ||
+        (palette && h->degree == 0) || h->palette_count * entry > h->index_bytes - at)
+        return FAIL_FIELD(palette_count, "the number of entries of the palette is invalid");
+    if (h->palette_offset != (palette ? at : 0))
+        return FAIL_FIELD(palette_offset, "the palette has a wrong offset");
+    at += h->palette_count * entry;
     if (h->text_offset != at || h->text_bytes != h->index_bytes - at ||
         h->text_bytes > TRIP_TEXT_BYTES_MAX)
         return FAIL_FIELD(text_offset, "the text has a wrong offset or length");
@@ -143,12 +151,12 @@ static const char *fault_of_brick(const trip_file_gaussian_brick *b,
             b->colour_hi[c] > TRIP_GAUSSIAN_COEFFICIENT_MAX)
             return "the range of a brick's colours is invalid";
         if (!(b->scale[c] >= 0 && b->scale[c] <= TRIP_GAUSSIAN_COEFFICIENT_MAX) ||
-            (c >= (int)h->degree && b->scale[c] != 0))
+            (c >= (h->palette_count ? 0 : (int)h->degree) && b->scale[c] != 0))
             return "the scale of a brick's spherical harmonics is invalid";
     }
     if (!(b->opacity_max >= 0 && b->opacity_max <= 1))
         return "the largest opacity of a brick is outside 0 to 1";
-    for (unsigned n = h->degree + 1; n < TRIP_GAUSSIAN_PLANES; n++)
+    for (unsigned n = trip_gaussian_plane_count(h, (int)h->degree); n < TRIP_GAUSSIAN_PLANES; n++)
         if (b->checksums[n])
             return "a brick has the checksum of a file that is absent";
     return NULL;
@@ -250,6 +258,23 @@ static int check_nodes(tables *t, const char *where)
                                  : FAIL_FIELD(records, "the nodes have another number of records");
 }
 
+/* The magnitudes of a palette must be finite. */
+static int check_palette(const unsigned char *entries, const trip_file_gaussian_header *h,
+                         const char *where)
+{
+    const unsigned bytes = trip_gaussian_entry_bytes((int)h->degree);
+    for (uint64_t i = 0; i < h->palette_count; i++)
+        for (int n = 1; n <= (int)h->degree; n++) {
+            const uint64_t at = i * bytes + trip_gaussian_entry_bytes(n - 1);
+            float largest;
+            memcpy(&largest, entries + at, sizeof largest);
+            if (!(largest >= 0 && largest <= TRIP_GAUSSIAN_COEFFICIENT_MAX))
+                return fail_at(where, h->palette_offset + at,
+                               "the magnitude of an entry of the palette is invalid");
+        }
+    return TRIP_OK;
+}
+
 int trip_gaussian_check_tables(const unsigned char *index, const trip_file_gaussian_header *h,
                                const char *where)
 {
@@ -266,6 +291,8 @@ int trip_gaussian_check_tables(const unsigned char *index, const trip_file_gauss
                                                     (const void *)(index + h->bricks_offset[1]),
                                                     (const void *)(index + h->bricks_offset[2]) } },
                              where);
+    if (status == TRIP_OK)
+        status = check_palette(index + h->palette_offset, h, where);
     if (status == TRIP_OK && memchr(index + h->text_offset, 0, h->text_bytes))
         return fail_at(where, h->text_offset, "the text contains a zero byte");
     return status;

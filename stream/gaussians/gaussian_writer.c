@@ -23,17 +23,18 @@ struct trip_gaussian_writer {
     trip_output planes[TRIP_GAUSSIAN_PLANES];
     trip_output bricks; /* unnamed, of all lists */
     trip_file_gaussian_node *nodes;
+    trip_gaussian_palette palette;
     uint64_t records[3];
     unsigned char *codes; /* a brick in all planes */
     size_t codes_bytes;
 };
 
 /* Returns the bytes of a record in all planes. */
-static size_t record_bytes(int degree)
+static size_t record_bytes(const trip_file_gaussian_header *h)
 {
     size_t bytes = 0;
-    for (int n = 0; n <= degree; n++)
-        bytes += trip_gaussian_plane_bytes((unsigned)n);
+    for (unsigned n = 0; n < trip_gaussian_plane_count(h, (int)h->degree); n++)
+        bytes += trip_gaussian_plane_bytes(h, n);
     return bytes;
 }
 
@@ -42,7 +43,7 @@ static int begin(trip_gaussian_writer *w, const trip_gaussian_writer_params *par
     int status = trip_folder_begin(&w->folder, params->path, params->replace);
     if (status < 0)
         return status;
-    w->codes_bytes = TRIP_GAUSSIAN_BRICK_RECORDS_MAX * record_bytes(params->degree);
+    w->codes_bytes = TRIP_GAUSSIAN_BRICK_RECORDS_MAX * record_bytes(&w->header);
     w->codes = trip_budget_take(w->budget, w->codes_bytes);
     if (!w->codes)
         return trip_fail(TRIP_ERROR, "brick", params->path,
@@ -85,10 +86,32 @@ const char *trip_gaussian_writer_folder(const trip_gaussian_writer *w)
     return w->folder.partial;
 }
 
+static unsigned plane_count(const trip_gaussian_writer *w)
+{
+    return trip_gaussian_plane_count(&w->header, (int)w->header.degree);
+}
+
+void trip_gaussian_writer_set_palette(trip_gaussian_writer *w, const trip_gaussian_palette *palette)
+{
+    w->palette = *palette;
+    w->header.flags |= TRIP_GAUSSIAN_PALETTE;
+    w->header.palette_count = palette->count;
+}
+
+static void write_entries(const trip_gaussian_writer *w, const unsigned char *const *splats,
+                          unsigned count, unsigned char *to)
+{
+    for (unsigned i = 0; i < count; i++) {
+        const unsigned number = w->palette.find(w->palette.user, splats[i]);
+        *to++ = (unsigned char)number;
+        *to++ = (unsigned char)(number >> 8);
+    }
+}
+
 static int finish_planes(trip_gaussian_writer *w)
 {
     int status = TRIP_OK;
-    for (unsigned n = 0; n <= w->header.degree; n++) {
+    for (unsigned n = 0; n < plane_count(w); n++) {
         trip_output *o = &w->planes[n];
         if (status == TRIP_OK && w->axis >= 0)
             status = trip_output_flush(o);
@@ -104,11 +127,11 @@ static int open_planes(trip_gaussian_writer *w, int axis)
     char name[32];
     int status = finish_planes(w);
     w->axis = axis;
-    for (unsigned n = 0; n <= w->header.degree && status == TRIP_OK; n++)
+    for (unsigned n = 0; n < plane_count(w) && status == TRIP_OK; n++)
         status = trip_output_create(
             &w->planes[n],
             &(trip_output_params){ .folder = w->folder.partial,
-                                   .name = trip_gaussian_plane_name(axis, n, name),
+                                   .name = trip_gaussian_plane_name(&w->header, axis, n, name),
                                    .buffer_bytes = BUFFER_BYTES },
             w->budget);
     return status;
@@ -164,13 +187,15 @@ int trip_gaussian_writer_append(trip_gaussian_writer *w, int axis, uint64_t node
     unsigned char *planes[TRIP_GAUSSIAN_PLANES] = { w->codes };
     trip_file_gaussian_brick b = { .first_record = w->records[axis], .size_class = size_class };
     int status = axis == w->axis ? TRIP_OK : open_planes(w, axis);
-    for (unsigned n = 1; n <= w->header.degree; n++)
-        planes[n] = planes[n - 1] +
-                    (size_t)TRIP_GAUSSIAN_BRICK_RECORDS_MAX * trip_gaussian_plane_bytes(n - 1);
-    trip_gaussian_encode(&b, splats, count, (int)w->header.degree, planes);
-    for (unsigned n = 0; n <= w->header.degree && status == TRIP_OK; n++)
+    for (unsigned n = 1; n < plane_count(w); n++)
+        planes[n] = planes[n - 1] + (size_t)TRIP_GAUSSIAN_BRICK_RECORDS_MAX *
+                                        trip_gaussian_plane_bytes(&w->header, n - 1);
+    if (w->palette.entries)
+        write_entries(w, splats, count, planes[1]);
+    trip_gaussian_encode(&b, &w->header, splats, count, planes);
+    for (unsigned n = 0; n < plane_count(w) && status == TRIP_OK; n++)
         status = trip_output_append(&w->planes[n], planes[n],
-                                    count * (size_t)trip_gaussian_plane_bytes(n));
+                                    count * (size_t)trip_gaussian_plane_bytes(&w->header, n));
     include(&w->header, &b);
     w->records[axis] += count;
     add_to_node(&w->header, &w->nodes[node], axis, &b);
@@ -202,6 +227,11 @@ static int append_index(trip_gaussian_writer *w, trip_output *index)
         XXH64_update(hash, piece, bytes);
         at += bytes;
     }
+    const size_t palette_bytes = h->palette_count * trip_gaussian_entry_bytes((int)h->degree);
+    if (status == TRIP_OK && palette_bytes)
+        status = trip_output_append(index, w->palette.entries, palette_bytes);
+    if (palette_bytes)
+        XXH64_update(hash, w->palette.entries, palette_bytes);
     if (status == TRIP_OK)
         status = trip_output_append(index, w->text, h->text_bytes);
     XXH64_update(hash, w->text, h->text_bytes);
@@ -231,6 +261,8 @@ static void complete_header(trip_gaussian_writer *w, const double lo[3], const d
         h->typical_lo[a] = fmin(fmax(lo[a], h->centre_lo[a]), h->centre_hi[a]);
         h->typical_hi[a] = fmax(fmin(hi[a], h->centre_hi[a]), h->typical_lo[a]);
     }
+    h->palette_offset = h->palette_count ? at : 0;
+    at += h->palette_count * trip_gaussian_entry_bytes((int)h->degree);
     h->text_offset = at;
     h->text_bytes = strlen(w->text);
     h->index_bytes = at + h->text_bytes;

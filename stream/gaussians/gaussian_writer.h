@@ -22,6 +22,19 @@ int trip_gaussian_writer_open(trip_gaussian_writer **out, const trip_gaussian_wr
                               trip_budget *budget);
 /* Returns the folder that is being written. Temporary files may lie there. */
 const char *trip_gaussian_writer_folder(const trip_gaussian_writer *w);
+/* The palette of a scene. */
+typedef struct trip_gaussian_palette {
+    const unsigned char *entries; /* see trip_gaussian_encode_entry() */
+    uint64_t count;
+    /* Returns the number of the entry for a splat. */
+    unsigned (*find)(const void *user, const unsigned char *splat);
+    const void *user;
+} trip_gaussian_palette;
+
+/* Stores the coefficients by a palette. Call it before the first brick. All that the palette points
+ * to must outlive the writer. */
+void trip_gaussian_writer_set_palette(trip_gaussian_writer *w,
+                                      const trip_gaussian_palette *palette);
 /* Gives the nodes, which the writer completes with their bricks. They must outlive the writer. */
 void trip_gaussian_writer_set_nodes(trip_gaussian_writer *w, trip_file_gaussian_node *nodes,
                                     uint64_t count);

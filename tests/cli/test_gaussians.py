@@ -267,6 +267,48 @@ class Gaussians(program.ProgramTest):
             self.assertGreater(one[:, :, 3].max(), 0.4)
             self.assertLess(255 * numpy.abs(cut - one).max(), 1, order)
 
+    # ---- palette ----
+
+    def test_a_palette_keeps_the_picture_of_a_scene_that_fits_into_it(self):
+        ply = os.path.join(program.DATASETS, "train-1000.ply")
+        rows = many(3000, degree=3)
+        write_scene("fits.ply", rows, 3)
+        for path in ply, "fits.ply":
+            sizes, pictures = [], []
+            for how in "auto", "palette", "whole":
+                run = self.works("brick", path, "-o", "p.trip", "--force", "--json", "--harmonics", how)
+                made = json.loads(run.stdout)
+                sizes.append(made["bytes"])
+                self.assertEqual(made["palette_entries"] > 0, how != "whole")
+                self.assertLess(255 * made["palette_error"], 0.2)
+                self.works("info", "--verify", "p.trip")
+                pictures.append([self.picture("p.trip", "--size", "90", "--azimuth", a, "--sh", sh)
+                                 for a in (0, 130) for sh in (1, 3)])
+            self.assertLess(sizes[1], 0.7 * sizes[2])
+            self.assertEqual(sizes[0], sizes[1])
+            apart = 255 * numpy.abs(numpy.array(pictures[1]) - pictures[2])
+            self.assertLess(apart.mean(), 0.05)
+            self.assertLess(apart.max(), 2)
+
+    def test_the_palette_states_the_error_of_colours(self):
+        """100000 sets without any likeness do not fit, so auto keeps them whole. Noise of 0.2 has the
+        mean square 0.2^2 * 15 / (4 pi) over all directions, of which a palette keeps the most."""
+        write_scene("unlike.ply", many(100000, degree=3), 3)
+        stated = {}
+        for how in "auto", "palette":
+            run = self.works("brick", "unlike.ply", "-o", how + ".trip", "--force", "--json",
+                             "--harmonics", how)
+            stated[how] = json.loads(run.stdout)
+        self.assertEqual(stated["auto"]["palette_entries"], 0)
+        self.assertEqual(stated["palette"]["palette_entries"], 65536)
+        error = 255 * stated["palette"]["palette_error"]
+        noise = 255 * 0.2 * math.sqrt(15 / (4 * math.pi))
+        self.assertGreater(error, noise / 4)
+        self.assertLess(error, 1.5 * noise)
+        whole, palette = (self.picture(how + ".trip", "--size", "90") for how in ("auto", "palette"))
+        # A pixel mixes Gaussians, so its error is at most the mean of theirs.
+        self.assertLess(255 * numpy.abs(whole - palette)[:, :, :3].mean(), error)
+
     # ---- levels ----
 
     def test_a_far_scene_has_the_mean_of_its_picture(self):
@@ -472,6 +514,9 @@ class Gaussians(program.ProgramTest):
                        ("--error", "1"), ("--kernel", "fixed"), ("--tf", "bone"), \
                        ("--effects", "shadows"), ("--renderer", "integral"):
             self.leaves_nothing(2, "render", data, "-o", "a.png", *options)
+        tooth = os.path.join(program.DATASETS, "tooth.nhdr")
+        self.leaves_nothing(2, "brick", tooth, "-o", "b.trip", "--harmonics", "whole",
+                            says="apply to Gaussian scenes only")
         self.leaves_nothing(2, "render", "settings.ply", "-o", "a.png", "--spacing", "1,1,1",
                             says="does not apply to Gaussian scenes")
         for options, says in ((["--clip-box", "voxels:0,0,0,1,1,1"], "--clip-box: voxels: does not apply"),

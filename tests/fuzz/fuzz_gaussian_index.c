@@ -49,6 +49,19 @@ static void decode(const trip_file_gaussian_brick *b, int degree)
     }
 }
 
+/* All entries of the palette decode to finite coefficients. */
+static void decode_entries(const trip_file_gaussian_header *h, const unsigned char *index)
+{
+    const unsigned bytes = trip_gaussian_entry_bytes((int)h->degree);
+    for (uint64_t i = 0; i < h->palette_count; i++) {
+        float sh[TRIP_SH_MAX][3] = { { 0 } };
+        trip_gaussian_decode_entry(index + h->palette_offset + i * bytes, (int)h->degree, sh);
+        for (int k = 0; k < TRIP_SH_MAX; k++)
+            for (int c = 0; c < 3; c++)
+                FUZZ_PROMISE(isfinite(sh[k][c]));
+    }
+}
+
 static void walk(const trip_file_gaussian_header *h, const unsigned char *index)
 {
     for (int a = 0; a < 3; a++) {
@@ -57,7 +70,7 @@ static void walk(const trip_file_gaussian_header *h, const unsigned char *index)
         for (uint64_t i = 0; i < h->brick_count[a]; i++, b++) {
             FUZZ_PROMISE(b->first_record == next);
             next += b->records;
-            decode(b, (int)h->degree);
+            decode(b, h->palette_count ? 0 : (int)h->degree);
         }
         FUZZ_PROMISE(next == h->list_records);
     }
@@ -93,6 +106,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         trip_gaussian_check_tables(index, &header, "fuzz") == TRIP_OK) {
         walk(&header, index);
         walk_levels(&header, index);
+        decode_entries(&header, index);
     }
     free(index);
     return 0;

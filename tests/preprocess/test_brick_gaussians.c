@@ -30,6 +30,8 @@ typedef struct scene {
     uint64_t fail_at; /* the source fails there; 0 means never */
     uint64_t cancel_at;
     trip_scope *scope;
+    bool palette;   /* otherwise harmonics are stored whole */
+    uint64_t alike; /* so many splats have the same harmonics; 0 means 1 */
 } scene;
 
 #define TAG 0.01
@@ -66,6 +68,8 @@ static trip_gaussian make_splat(const scene *s, uint64_t i)
     for (int k = 0; k < 4; k++)
         g.rotation[k] = (float)((double)g.rotation[k] / sqrt(length));
     g.opacity = (float)random_of(&state);
+    if (s->alike)
+        state = i / s->alike * 88172645463325252u + 1;
     for (int k = 0; k < trip_sh_count(s->degree); k++)
         for (int c = 0; c < 3; c++)
             g.sh[k][c] = (float)((2 * random_of(&state) - 1) * (k ? 0.3 : 1.7));
@@ -99,6 +103,8 @@ static int brick(scene *s, const char *path, uint64_t memory, uint64_t *peak)
                                         .source = read_scene,
                                         .source_user = s,
                                         .degree = s->degree,
+                                        .harmonics = s->palette ? TRIP_BRICK_HARMONICS_PALETTE
+                                                                : TRIP_BRICK_HARMONICS_WHOLE,
                                         .flags = TRIP_GAUSSIAN_Y_DOWN,
                                         .text = "{\"source\": \"made by numbers\"}" },
         budget, NULL);
@@ -228,6 +234,43 @@ static void a_scene_comes_back_within_the_stated_errors(void **state)
         }
         close_set(set, budget);
     }
+}
+
+static void a_palette_with_an_entry_for_each_splat_is_exact(void **state)
+{
+    (void)state;
+    for (int degree = 1; degree <= 3; degree++) {
+        scene s = { .count = 30000, .degree = degree, .palette = true };
+        trip_budget *budget;
+        assert_int_equal(brick(&s, NAME, 128 * MIB, NULL), TRIP_OK);
+        trip_gaussian_set *set = open_set(NAME, &budget);
+        assert_int_equal(set->header.flags, TRIP_GAUSSIAN_Y_DOWN | TRIP_GAUSSIAN_PALETTE);
+        assert_int_equal(set->header.palette_count, set->header.list_records);
+        assert_int_equal(trip_gaussian_set_verify(set, budget), TRIP_OK);
+        for (int axis = 0; axis < 3; axis++) {
+            const errors e = stream_and_compare(set, &s, axis, budget);
+            assert_true(e.colour <= 3.4 / 16383 / 2 + 1e-6);
+            assert_true(e.harmonics <= 0.3 / 254 + 1e-6);
+        }
+        close_set(set, budget);
+    }
+}
+
+/* 100000 splats have 1000 different sets of coefficients. Coarse splats have others. */
+static void a_palette_finds_the_sets_that_splats_share(void **state)
+{
+    (void)state;
+    scene s = { .count = 100000, .degree = 2, .palette = true, .alike = 100 };
+    trip_budget *budget;
+    assert_int_equal(brick(&s, NAME, 128 * MIB, NULL), TRIP_OK);
+    trip_gaussian_set *set = open_set(NAME, &budget);
+    assert_in_range(set->header.palette_count, 1000, 1000 + set->header.list_records - s.count);
+    assert_int_equal(set->bytes - 24 * 3 * set->header.list_records <
+                         2 * 3 * set->header.list_records + (UINT64_C(5) << 20),
+                     true);
+    const errors e = stream_and_compare(set, &s, 1, budget);
+    assert_true(e.harmonics <= 0.3 / 254 + 1e-6);
+    close_set(set, budget);
 }
 
 static void large_coordinates_keep_millimetres(void **state)
@@ -411,6 +454,11 @@ static void little_memory_suffices_and_gives_the_same_bytes(void **state)
     assert_true(peak <= 3 * MIB);
     assert_int_equal(brick(&s, OTHER, 30 * MIB, NULL), TRIP_OK);
     assert_same_files(NAME, OTHER, 7);
+    s = (scene){ .count = 300000, .degree = 1, .palette = true };
+    assert_int_equal(brick(&s, NAME, 14 * MIB, &peak), TRIP_OK);
+    assert_true(peak <= 14 * MIB);
+    assert_int_equal(brick(&s, OTHER, 100 * MIB, NULL), TRIP_OK);
+    assert_same_files(NAME, OTHER, 4);
 }
 
 static void strays_do_no_harm(void **state)
@@ -662,7 +710,7 @@ static void write_changed(const unsigned char *index, size_t bytes, size_t at, c
 static void a_false_index_with_valid_checksums_is_refused(void **state)
 {
     (void)state;
-    const uint32_t four = 4, eight = 8, none = 0, many = 7000;
+    const uint32_t four = 4, eight = 8, sixteen = 16, none = 0, many = 7000;
     const uint64_t huge = UINT64_C(1) << 60, wrong = 5, zero = 0;
     const double nan_double = NAN, far = 1e17, low = -1e9;
     const float nan_float = NAN, large = 1e31f, two = 2, hot = 80;
@@ -679,7 +727,10 @@ static void a_false_index_with_valid_checksums_is_refused(void **state)
         { HEADER(index_bytes), &wrong, 8, "instead of the 5 in its header" },
         { HEADER(records), &wrong, 8, "another number of records" },
         { HEADER(degree), &four, 4, "above 3" },
-        { HEADER(flags), &eight, 4, "unknown flags" },
+        { HEADER(flags), &sixteen, 4, "unknown flags" },
+        { HEADER(flags), &eight, 4, "entries of the palette" },
+        { HEADER(palette_count), &wrong, 8, "entries of the palette" },
+        { HEADER(palette_offset), &wrong, 8, "palette has a wrong offset" },
         { HEADER(brick_count), &huge, 8, "does not fit the file" },
         { HEADER(bricks_offset), &huge, 8, "wrong offset" },
         { HEADER(text_offset), &huge, 8, "text has a wrong offset" },
@@ -831,6 +882,8 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_scene_comes_back_within_the_stated_errors),
+        cmocka_unit_test(a_palette_with_an_entry_for_each_splat_is_exact),
+        cmocka_unit_test(a_palette_finds_the_sets_that_splats_share),
         cmocka_unit_test(large_coordinates_keep_millimetres),
         cmocka_unit_test(streams_deliver_in_exact_order_in_any_direction),
         cmocka_unit_test(all_splats_at_one_place_keep_their_order),
