@@ -209,7 +209,7 @@ TRIPTYCH_API int triptych_get_info(triptych *t, triptych_info *out);
 
 /* An open data set of a Gaussian scene. Lengths are in units of the scene. */
 typedef struct triptych_scene {
-    uint64_t gaussians, bricks; /* bricks of the three lists, with those of coarse levels */
+    uint64_t gaussians, bricks; /* bricks of the three lists, all levels */
     uint64_t coarse;            /* Gaussians of coarse levels, not in `gaussians` */
     uint64_t bytes;             /* of all files */
     int degree;                 /* of the spherical harmonics, 0 to 3 */

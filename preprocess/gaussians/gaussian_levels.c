@@ -157,8 +157,8 @@ int trip_gaussian_levels_add(trip_gaussian_levels *l, const trip_gaussian *g, ui
     return keep_whole(l, g, merging);
 }
 
-/* Selects the voxels of a node and of all nodes inside it. Returns the number of its Gaussians, or
- * of those of the nodes inside it if it is not kept. */
+/* Selects the voxels of a node and of all nodes inside it. Returns the number of its Gaussians. A
+ * node that is not kept returns the Gaussians of the nodes inside it. */
 static uint64_t select_node(trip_gaussian_levels *l, uint64_t node)
 {
     const trip_octree_node *n = &l->p.octree->nodes[node];

@@ -2,9 +2,9 @@
  * first pass counts: a node of the octree is kept if its voxels hold few enough Gaussians. The
  * second pass merges the Gaussians of each voxel of a kept node (gaussian_moments.h).
  *
- * A node has 2^k voxels along each side. k is as large as possible, so that the node has at most
- * half of the Gaussians that it stands for, and at most TRIP_LEVEL_RECORDS_MAX. A Gaussian with a
- * deviation above 3/4 of a voxel is not merged: the node holds it as it is. One thread. */
+ * A node has 2^k voxels along each side, with the largest k that leaves at most half of the
+ * Gaussians, and at most TRIP_LEVEL_RECORDS_MAX. A Gaussian with a deviation above 3/4 of a voxel
+ * is not merged. The node holds it unchanged. One thread. */
 #ifndef TRIP_GAUSSIAN_LEVELS_H
 #define TRIP_GAUSSIAN_LEVELS_H
 

@@ -8,7 +8,7 @@
 /* Vectors lo to hi of the order. */
 typedef struct part {
     uint32_t lo, hi, dimension;
-    int32_t node; /* whose child it is; -1: of none */
+    int32_t node; /* the node around it; -1 for the root */
     bool right;
     double error, value; /* sum of squares from the mean; where the part is divided */
 } part;

@@ -37,7 +37,7 @@ typedef struct trip_gaussian_frame_params {
 typedef struct trip_gaussian_frame_stats {
     uint64_t gaussians; /* drawn from the streams, over all layers */
     uint64_t planned;   /* in the plans of the streams */
-    uint64_t coarse;    /* of these, those of coarse levels */
+    uint64_t coarse;    /* in the plans, of coarse levels */
     uint64_t bricks, bytes_read;
     uint64_t window_records; /* room in the largest window */
     unsigned layers;

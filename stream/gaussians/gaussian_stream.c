@@ -143,8 +143,8 @@ static bool is_wanted(const trip_gaussian_stream_params *p, const trip_file_gaus
     return true;
 }
 
-/* Returns the share of a node that has nodes inside it: 0 if its voxels are too wide, 1 if they are
- * narrower by a quarter of an octave. */
+/* Returns the share of a node with nodes inside it. It is 0 if the voxels are too wide, and 1 if
+ * they are narrower by a quarter of an octave. */
 static double share_of(const trip_gaussian_lod *lod, const trip_file_gaussian_node *n)
 {
     const double octaves = 0.25;

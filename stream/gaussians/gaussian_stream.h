@@ -27,10 +27,10 @@ typedef struct trip_gaussian_plane {
 
 enum { TRIP_GAUSSIAN_SIDES = 4, TRIP_GAUSSIAN_PLANES_MAX = 16 };
 
-/* Which coarse Gaussians stand for those of the scene. A node is drawn instead of the nodes inside
- * it if its voxels are at most `voxel_px` pixels wide at the point of its box that is nearest to
- * the eye. Over the last quarter of an octave before that width, both are drawn, and share out the
- * optical depth. So each Gaussian of the scene is drawn once, by itself or by coarse ones. */
+/* The level of detail. A node is drawn instead of the nodes inside it if its voxels are at most
+ * `voxel_px` pixels wide. The point of the node's box that is nearest to the eye decides. Over the
+ * last quarter of an octave before that width, both are drawn, and share out the optical depth. So
+ * each Gaussian of the scene is drawn once, by itself or by coarse ones. */
 typedef struct trip_gaussian_lod {
     double voxel_px; /* 0: the Gaussians of the scene alone */
     double eye[3];

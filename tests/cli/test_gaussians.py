@@ -280,7 +280,7 @@ class Gaussians(program.ProgramTest):
                 made = json.loads(run.stdout)
                 sizes.append(made["bytes"])
                 self.assertEqual(made["palette_entries"] > 0, how != "whole")
-                self.assertLess(255 * made["palette_error"], 0.2)
+                self.assertLess(255 * made["palette_error"], 0.4)
                 self.works("info", "--verify", "p.trip")
                 pictures.append([self.picture("p.trip", "--size", "90", "--azimuth", a, "--sh", sh)
                                  for a in (0, 130) for sh in (1, 3)])
@@ -306,7 +306,7 @@ class Gaussians(program.ProgramTest):
         self.assertGreater(error, noise / 4)
         self.assertLess(error, 1.5 * noise)
         whole, palette = (self.picture(how + ".trip", "--size", "90") for how in ("auto", "palette"))
-        # A pixel mixes Gaussians, so its error is at most the mean of theirs.
+        # A pixel mixes Gaussians, so it changes less than their colours.
         self.assertLess(255 * numpy.abs(whole - palette)[:, :, :3].mean(), error)
 
     # ---- levels ----
