@@ -138,7 +138,7 @@ static int read_some(void *user, trip_gaussian *out, size_t room, size_t *got)
 
 static void show_passed(void *user, uint64_t passed)
 {
-    enum { PASSES = 4 };
+    enum { PASSES = 6 };
     const bricking *b = user;
     const uint64_t all = PASSES * trip_gaussian_file_info(b->file)->count;
     if (b->t->show)

@@ -33,8 +33,8 @@ typedef struct trip_brick_gaussians_params {
     const char *text; /* JSON that the data set keeps; NULL means "{}" */
     /* Folder for temporary files, which have no names. NULL means the new data set's folder. */
     const char *temporary;
-    /* Called now and then by the bricking thread. A scene is done when it has passed 4 times: it is
-     * read once and sorted thrice. May be NULL. */
+    /* Called now and then by the bricking thread. A scene is done when it has passed about 6 times:
+     * it is read, sorted by the octree, merged, and sorted by three axes. May be NULL. */
     void (*progress)(void *user, uint64_t passed);
     void *progress_user;
 } trip_brick_gaussians_params;
