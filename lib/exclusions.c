@@ -87,6 +87,8 @@ static const struct rule {
       "does not apply to --renderer integral; use --tolerance", IDLE },
     { ROW(METHOD) | ROW(H) | ROW(WEIGHTS) | ROW(TRAVERSAL) | ROW(COMPOSITING), RENDERER(INTEGRAL),
       0, 0, "does not apply to --renderer integral, which has no layers", IDLE },
+    { ROW(ORDER), RENDERER(INTEGRAL), 0, 0,
+      "does not apply to --renderer integral, which has no order", IDLE },
     { ROW(SHOW), RENDERER(INTEGRAL), DEBUG_VIEW, 0,
       "does not apply to --renderer integral, which has no lists and no levels", CONFLICT },
     { of_levels, RENDERER(INTEGRAL), 0, 0,
@@ -316,7 +318,8 @@ int draw_settings_check_kind(const draw_settings *s, bool is_scene)
     static const uint64_t of_scenes = ROW(ORDER) | ROW(HARMONICS);
     static const uint64_t of_both = ROW(BACKGROUND) | ROW(CLIP_BOX) | ROW(CLIP_PLANE) |
                                     ROW(EARLY_TERMINATION) | ROW(FOOTPRINT) | ROW(SAMPLES) |
-                                    ROW(DEPTH) | ROW(NORMALISE) | ROW(METHOD) | ROW(H);
+                                    ROW(DEPTH) | ROW(NORMALISE) | ROW(METHOD) | ROW(H) |
+                                    ROW(TOLERANCE);
     const struct rule of_kind = {
         .given = is_scene ? ~(of_scenes | of_both) : of_scenes,
         .why = is_scene ? "does not apply to Gaussian scenes" : "applies to Gaussian scenes only",

@@ -89,13 +89,14 @@ trip_view_object trip_context_scene_object(const triptych *t)
 
 /* ---- frames ---- */
 
-static int check(const triptych *t, bool *reference)
+static int check(const triptych *t)
 {
-    const triptych_renderer r = t->resources.renderer;
-    *reference = r == TRIPTYCH_RENDERER_REFERENCE;
-    if (r == TRIPTYCH_RENDERER_GL || r == TRIPTYCH_RENDERER_INTEGRAL)
+    triptych_renderer r = t->resources.renderer;
+    if (r == TRIPTYCH_RENDERER_GL)
         return trip_fail(TRIP_USAGE, "render", t->name,
-                         "is a Gaussian scene; use --renderer cpu or reference");
+                         "is a Gaussian scene; use --renderer cpu, reference or integral");
+    if (r == TRIPTYCH_RENDERER_INTEGRAL && draw_settings_check(&t->given, &r, false))
+        return TRIP_USAGE;
     if (t->given.splat.footprint == TRIPTYCH_FOOTPRINT_FIXED)
         return trip_option_fail("--kernel", "fixed does not apply to Gaussian scenes");
     if (t->given.all.method == TRIPTYCH_METHOD_IMAGE)
@@ -156,11 +157,10 @@ static int take_fine(triptych *t, int side)
 
 int trip_context_begin_scene(triptych *t)
 {
-    bool reference;
     const int side = t->given.all.samples > 0 ? t->given.all.samples : 1;
     int status = trip_context_check_idle(t, true);
     if (!status)
-        status = check(t, &reference);
+        status = check(t);
     if (!status && !t->has_view)
         status = trip_context_find_view(t, &(triptych_view){ 0 });
     if (!status && !t->renderer) /* lends its threads */
@@ -180,7 +180,9 @@ int trip_context_begin_scene(triptych *t)
         .camera = &t->camera,
         .settings = settings_of(t),
         .by_lists = t->given.scene.order == TRIPTYCH_ORDER_LISTS ? &t->drawn_settings : NULL,
-        .reference = reference,
+        .reference = t->resources.renderer == TRIPTYCH_RENDERER_REFERENCE,
+        .integral = t->resources.renderer == TRIPTYCH_RENDERER_INTEGRAL,
+        .tolerance = t->given.integral.tolerance,
         .budget = t->session.budget,
         .runner = trip_renderer_runner(t->renderer),
     };
@@ -195,7 +197,7 @@ static triptych_frame_stats stats_of(const triptych *t)
 {
     const trip_gaussian_frame_stats s = trip_gaussian_frame_get_stats(t->scene_frame);
     const trip_gaussian_settings settings = settings_of(t);
-    const bool reference = t->resources.renderer == TRIPTYCH_RENDERER_REFERENCE;
+    const triptych_renderer r = t->resources.renderer;
     return (triptych_frame_stats){
         .ms = trip_now_ms() - t->begun_ms,
         .wait_ms = s.read_ms,
@@ -206,8 +208,10 @@ static triptych_frame_stats stats_of(const triptych *t)
         .reads = s.bricks,
         .memory_bytes = trip_budget_limit_bytes(t->session.budget),
         .peak_memory_bytes = trip_budget_peak_bytes(t->session.budget),
-        .renderer = reference ? "reference" : "cpu",
-        .device = reference ? "CPU, double precision, 1 thread" : t->device,
+        .renderer = r == TRIPTYCH_RENDERER_REFERENCE  ? "reference"
+                    : r == TRIPTYCH_RENDERER_INTEGRAL ? "integral"
+                                                      : "cpu",
+        .device = r == TRIPTYCH_RENDERER_REFERENCE ? "CPU, double precision, 1 thread" : t->device,
         .engine = "pread",
         .ring = "not used: Gaussians come from windows",
         .classify = TRIPTYCH_CLASSIFY_PRE,
@@ -251,9 +255,12 @@ void trip_context_explain_scene(const triptych *t, FILE *out)
     const trip_gaussian_frame_stats s = trip_gaussian_frame_get_stats(t->scene_frame);
     const trip_gaussian_settings settings = settings_of(t);
     const bool lists = t->given.scene.order == TRIPTYCH_ORDER_LISTS;
+    const bool integral = t->resources.renderer == TRIPTYCH_RENDERER_INTEGRAL;
     fprintf(out, "scene       %llu Gaussians, harmonics up to degree %d of %u\n",
             (unsigned long long)t->scene->header.records, settings.degree, t->scene->header.degree);
-    if (lists)
+    if (integral)
+        fprintf(out, "order       none: the integral of overlapping Gaussians along each ray\n");
+    else if (lists)
         fprintf(out, "order       by lists: %u of 3 have weight in the picture\n", s.layers);
     else
         fprintf(out, "order       by depth: at most %llu Gaussians wait in the window\n",

@@ -108,7 +108,8 @@ typedef enum triptych_renderer {
     TRIPTYCH_RENDERER_CPU,
     TRIPTYCH_RENDERER_REFERENCE, /* double precision, slow */
     /* The integral along each ray in double precision, which all other renderers approximate.
-     * Slowest. The whole volume must fit in memory, at 16 bytes per voxel. */
+     * Slowest. The whole volume must fit in memory, at 16 bytes per voxel. Of a Gaussian scene, all
+     * Gaussians in view must fit, at 352 bytes each. */
     TRIPTYCH_RENDERER_INTEGRAL,
 } triptych_renderer;
 

@@ -135,20 +135,30 @@ static inline double trip_gaussian_opacity(const trip_gaussian *g, const trip_ga
     return opacity;
 }
 
+/* Sets the rows of the Jacobian at a footprint's position and depth. */
+static inline void trip_gaussian_jacobian(const trip_camera *c, trip_gaussian_shape shape,
+                                          const trip_gaussian_footprint *f, trip_vec3 *jx,
+                                          trip_vec3 *jy)
+{
+    const bool limited = shape == TRIP_GAUSSIAN_PROJECTED;
+    *jx = c->to_x;
+    *jy = c->to_y;
+    if (c->ortho)
+        return;
+    const double w = 0.5 * c->width, h = 0.5 * c->height, clamp = TRIP_GAUSSIAN_CLAMP;
+    const double x = !limited ? f->x : fmin(w * (1 + clamp), fmax(w * (1 - clamp), f->x));
+    const double y = !limited ? f->y : fmin(h * (1 + clamp), fmax(h * (1 - clamp), f->y));
+    *jx = trip_scale(trip_sub(*jx, trip_scale(c->forward, x)), 1 / f->z);
+    *jy = trip_scale(trip_sub(*jy, trip_scale(c->forward, y)), 1 / f->z);
+}
+
 /* Sets the shape and the opacity of a footprint from its position. Returns false if nothing of it
  * counts. */
 static inline bool trip_gaussian_project(const trip_camera *c, const trip_gaussian_settings *s,
                                          const trip_gaussian *g, trip_gaussian_footprint *f)
 {
-    const bool limited = s->shape == TRIP_GAUSSIAN_PROJECTED;
-    trip_vec3 jx = c->to_x, jy = c->to_y;
-    if (!c->ortho) {
-        const double w = 0.5 * c->width, h = 0.5 * c->height, clamp = TRIP_GAUSSIAN_CLAMP;
-        const double x = !limited ? f->x : fmin(w * (1 + clamp), fmax(w * (1 - clamp), f->x));
-        const double y = !limited ? f->y : fmin(h * (1 + clamp), fmax(h * (1 - clamp), f->y));
-        jx = trip_scale(trip_sub(jx, trip_scale(c->forward, x)), 1 / f->z);
-        jy = trip_scale(trip_sub(jy, trip_scale(c->forward, y)), 1 / f->z);
-    }
+    trip_vec3 jx, jy;
+    trip_gaussian_jacobian(c, s->shape, f, &jx, &jy);
     const trip_vec3 deviations = trip_gaussian_deviations(g);
     const trip_vec3 a = trip_vec3_times(trip_gaussian_to_axes(g, jx), deviations);
     const trip_vec3 b = trip_vec3_times(trip_gaussian_to_axes(g, jy), deviations);

@@ -5,6 +5,7 @@
  * - The order by lists has a layer for each axis with weight in the picture. Its Gaussians come in
  *   the order of their coordinate along the axis, outwards from the eye. Layers are merged with
  *   w^2 (equation 3 of Hofsetz, Max & Bastos 2008; weight.h).
+ * - The integral has neither order nor layers (gaussian_integral.h).
  *
  * A layer ends early once no pixel takes more. One thread; the runner lends others. */
 #ifndef TRIP_GAUSSIAN_FRAME_H
@@ -24,7 +25,9 @@ typedef struct trip_gaussian_frame_params {
     trip_gaussian_settings settings;
     /* For the order by lists: its method and h. NULL: by depth. */
     const trip_settings *by_lists;
-    bool reference; /* draws in double precision, without threads */
+    bool reference;   /* draws in double precision, without threads */
+    bool integral;    /* has no order */
+    double tolerance; /* of the integral; 0 means the default */
     trip_budget *budget;
     trip_task_runner runner;
 } trip_gaussian_frame_params;
