@@ -40,6 +40,7 @@ enum {
     MAY_EMIT = 1 << 26,
     NEAREST = 1 << 27,
     UNFILTERED = 1 << 28,
+    BY_SHEETS = 1 << 29,
 };
 
 static const uint64_t of_splats =
@@ -87,8 +88,9 @@ static const struct rule {
       "does not apply to --renderer integral; use --tolerance", IDLE },
     { ROW(METHOD) | ROW(H) | ROW(WEIGHTS) | ROW(TRAVERSAL) | ROW(COMPOSITING), RENDERER(INTEGRAL),
       0, 0, "does not apply to --renderer integral, which has no layers", IDLE },
-    { ROW(ORDER), RENDERER(INTEGRAL), 0, 0,
+    { ROW(ORDER) | ROW(SHEET), RENDERER(INTEGRAL), 0, 0,
       "does not apply to --renderer integral, which has no order", IDLE },
+    { ROW(SHEET), ALL, 0, BY_SHEETS, "requires --order sheets", IDLE },
     { ROW(SHOW), RENDERER(INTEGRAL), DEBUG_VIEW, 0,
       "does not apply to --renderer integral, which has no lists and no levels", CONFLICT },
     { of_levels, RENDERER(INTEGRAL), 0, 0,
@@ -215,6 +217,7 @@ static int facts_of(const draw_settings *s)
            (s->integral.field == TRIPTYCH_FIELD_SPLATS ? FIELD_OF_SPLATS : 0) |
            (s->all.show > TRIPTYCH_SHOW_PICTURE ? DEBUG_VIEW : 0) |
            (s->all.show == TRIPTYCH_SHOW_MERGE ? SHOW_MERGE : 0) |
+           (s->scene.order == TRIPTYCH_ORDER_SHEETS ? BY_SHEETS : 0) |
            (s->all.count_exactly ? COUNTED : 0) | (s->all.samples > 1 ? SEVERAL_SAMPLES : 0) |
            facts_of_splats(s) | facts_of_effects(s);
 }
@@ -315,7 +318,7 @@ int draw_settings_check(const draw_settings *s, triptych_renderer *renderer, boo
 
 int draw_settings_check_kind(const draw_settings *s, bool is_scene)
 {
-    static const uint64_t of_scenes = ROW(ORDER) | ROW(HARMONICS);
+    static const uint64_t of_scenes = ROW(ORDER) | ROW(SHEET) | ROW(HARMONICS);
     static const uint64_t of_both = ROW(BACKGROUND) | ROW(CLIP_BOX) | ROW(CLIP_PLANE) |
                                     ROW(EARLY_TERMINATION) | ROW(FOOTPRINT) | ROW(SAMPLES) |
                                     ROW(DEPTH) | ROW(NORMALISE) | ROW(METHOD) | ROW(H) |

@@ -1,5 +1,6 @@
 /* Gaussian scenes: opening, views and frames (triptych.h). */
 #include <float.h>
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -139,6 +140,27 @@ static trip_gaussian_settings settings_of(const triptych *t)
     return out;
 }
 
+static bool has_lists(const triptych *t)
+{
+    return t->given.scene.order >= TRIPTYCH_ORDER_LISTS;
+}
+
+/* Returns the thickness of the sheets, or 0 for other orders. */
+static double sheet_of(const triptych *t)
+{
+    const trip_file_gaussian_header *h = &t->scene->header;
+    enum { SHEETS_IN_RADIUS = 512 };
+    double sum = 0;
+    if (t->given.scene.order != TRIPTYCH_ORDER_SHEETS)
+        return 0;
+    if (t->given.scene.sheet > 0)
+        return t->given.scene.sheet;
+    const trip_view_object o = trip_context_scene_object(t);
+    for (int a = 0; a < 3; a++)
+        sum += (o.hi[a] - o.lo[a]) * (o.hi[a] - o.lo[a]);
+    return sum > 0 ? sqrt(sum) / 2 / SHEETS_IN_RADIUS : fmax(1, fabs(h->centre_lo[0])) * 1e-6;
+}
+
 /* Takes the picture of several rays per pixel. */
 static int take_fine(triptych *t, int side)
 {
@@ -179,7 +201,8 @@ int trip_context_begin_scene(triptych *t)
         .set = t->scene,
         .camera = &t->camera,
         .settings = settings_of(t),
-        .by_lists = t->given.scene.order == TRIPTYCH_ORDER_LISTS ? &t->drawn_settings : NULL,
+        .by_lists = has_lists(t) ? &t->drawn_settings : NULL,
+        .sheet = sheet_of(t),
         .reference = t->resources.renderer == TRIPTYCH_RENDERER_REFERENCE,
         .integral = t->resources.renderer == TRIPTYCH_RENDERER_INTEGRAL,
         .tolerance = t->given.integral.tolerance,
@@ -254,13 +277,17 @@ void trip_context_explain_scene(const triptych *t, FILE *out)
 {
     const trip_gaussian_frame_stats s = trip_gaussian_frame_get_stats(t->scene_frame);
     const trip_gaussian_settings settings = settings_of(t);
-    const bool lists = t->given.scene.order == TRIPTYCH_ORDER_LISTS;
     const bool integral = t->resources.renderer == TRIPTYCH_RENDERER_INTEGRAL;
     fprintf(out, "scene       %llu Gaussians, harmonics up to degree %d of %u\n",
             (unsigned long long)t->scene->header.records, settings.degree, t->scene->header.degree);
     if (integral)
         fprintf(out, "order       none: the integral of overlapping Gaussians along each ray\n");
-    else if (lists)
+    else if (sheet_of(t) > 0)
+        fprintf(out,
+                "order       by sheets %.4g thick, in %u passes: at most %llu Gaussians meet a "
+                "sheet at a time\n",
+                sheet_of(t), s.layers, (unsigned long long)s.window_records);
+    else if (has_lists(t))
         fprintf(out, "order       by lists: %u of 3 have weight in the picture\n", s.layers);
     else
         fprintf(out, "order       by depth: at most %llu Gaussians wait in the window\n",

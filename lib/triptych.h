@@ -579,6 +579,10 @@ typedef enum triptych_order {
     /* By their coordinates along X, Y and Z. The layers of the three lists are blended. Fewer
      * Gaussians change places when the view turns. */
     TRIPTYCH_ORDER_LISTS,
+    /* In slabs of space, perpendicular to X, Y and Z. A Gaussian shares out its optical depth over
+     * the sheets that it reaches. The order inside a sheet does not matter. The picture comes close
+     * to the integral of overlapping Gaussians. Not with GL. */
+    TRIPTYCH_ORDER_SHEETS,
 } triptych_order;
 
 /* The highest degree of the spherical harmonics of a scene that are read and drawn. */
@@ -594,6 +598,9 @@ typedef enum triptych_harmonics {
 typedef struct triptych_scene_settings {
     triptych_order order;
     triptych_harmonics harmonics;
+    /* Thickness of a sheet in units of the scene; for the order by sheets. The default is a 512th
+     * of the scene's radius, half the diagonal of its typical bounds. */
+    double sheet;
 } triptych_scene_settings;
 
 /* The settings of a picture. NULL selects the defaults of a group. */

@@ -7,6 +7,7 @@
 #include "clock.h"
 #include "gaussian_integral.h"
 #include "gaussian_keys.h"
+#include "gaussian_sheet_frame.h"
 #include "gaussians_cpu.h"
 #include "gaussians_reference.h"
 #include "normalise.h"
@@ -33,8 +34,10 @@ typedef struct layer {
 
 struct trip_gaussian_frame {
     trip_gaussian_frame_params params;
-    trip_gaussian_integral *integral; /* if not NULL, it draws the frame */
-    trip_settings weights;            /* of the order by lists */
+    /* If one of these is not NULL, it draws the frame. */
+    trip_gaussian_integral *integral;
+    trip_gaussian_sheet_frame *sheets;
+    trip_settings weights; /* of the order by lists */
     int axis_of_view;
     layer layers[LAYERS_MAX];
     unsigned layer_count, drawn; /* layers; those that are complete */
@@ -250,6 +253,38 @@ static trip_gaussian_frame_stats stats_of_integral(const trip_gaussian_frame *f)
     };
 }
 
+/* ---- sheets ---- */
+
+static int begin_sheets(trip_gaussian_frame *f)
+{
+    const trip_gaussian_frame_params *p = &f->params;
+    return trip_gaussian_sheet_frame_begin(&f->sheets, &(trip_gaussian_sheet_frame_params){
+                                                           .set = p->set,
+                                                           .camera = p->camera,
+                                                           .settings = p->settings,
+                                                           .weights = &f->weights,
+                                                           .thickness = p->sheet,
+                                                           .reference = p->reference,
+                                                           .budget = p->budget,
+                                                           .runner = p->runner,
+                                                       });
+}
+
+static trip_gaussian_frame_stats stats_of_sheets(const trip_gaussian_frame *f)
+{
+    const trip_gaussian_sheet_frame_stats s = trip_gaussian_sheet_frame_get_stats(f->sheets);
+    return (trip_gaussian_frame_stats){
+        .gaussians = s.gaussians,
+        .bricks = s.bricks,
+        .bytes_read = s.bytes_read,
+        .window_records = s.held_records,
+        .layers = s.passes,
+        .draw_ms = s.draw_ms,
+        .read_ms = s.read_ms,
+        .merge_ms = f->stats.merge_ms,
+    };
+}
+
 /* ---- the frame ---- */
 
 static int begin_layers_and_streams(trip_gaussian_frame *f)
@@ -275,7 +310,9 @@ int trip_gaussian_frame_begin(trip_gaussian_frame **out, const trip_gaussian_fra
     f->axis_of_view = trip_weight_axis_of_view(params->camera);
     if (params->by_lists)
         f->weights = *params->by_lists;
-    const int status = params->integral ? begin_integral(f) : begin_layers_and_streams(f);
+    const int status = params->integral    ? begin_integral(f)
+                       : params->sheet > 0 ? begin_sheets(f)
+                                           : begin_layers_and_streams(f);
     if (!status)
         return 0;
     trip_gaussian_frame_end(f);
@@ -311,6 +348,8 @@ int trip_gaussian_frame_step(trip_gaussian_frame *f, uint64_t deadline_ns)
     int status = 0;
     if (f->integral)
         return trip_gaussian_integral_step(f->integral, deadline_ns);
+    if (f->sheets)
+        return trip_gaussian_sheet_frame_step(f->sheets, deadline_ns);
     while (!status && f->drawn < f->layer_count) {
         status = draw_batch(f);
         if (!status)
@@ -365,6 +404,8 @@ int trip_gaussian_frame_picture(trip_gaussian_frame *f, float *rgba, float *dept
     const double begun = trip_now_ms();
     if (f->integral)
         trip_gaussian_integral_picture(f->integral, rgba);
+    else if (f->sheets)
+        trip_gaussian_sheet_frame_picture(f->sheets, rgba, depth);
     else if (f->params.by_lists)
         merge(f, rgba, depth);
     else
@@ -375,7 +416,7 @@ int trip_gaussian_frame_picture(trip_gaussian_frame *f, float *rgba, float *dept
 
 trip_gaussian_frame_stats trip_gaussian_frame_get_stats(const trip_gaussian_frame *f)
 {
-    return f->integral ? stats_of_integral(f) : f->stats;
+    return f->integral ? stats_of_integral(f) : f->sheets ? stats_of_sheets(f) : f->stats;
 }
 
 void trip_gaussian_frame_end(trip_gaussian_frame *f)
@@ -384,6 +425,7 @@ void trip_gaussian_frame_end(trip_gaussian_frame *f)
         return;
     trip_budget *budget = f->params.budget;
     trip_gaussian_integral_end(f->integral);
+    trip_gaussian_sheet_frame_end(f->sheets);
     close_streams(f);
     for (unsigned i = 0; i < f->layer_count; i++) {
         trip_gaussians_cpu_end(f->layers[i].cpu);

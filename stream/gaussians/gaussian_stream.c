@@ -124,6 +124,14 @@ static bool is_behind(const trip_gaussian_plane *p, const trip_file_gaussian_bri
     return corner_key(&key, b, true) + p->reach * radius < 0;
 }
 
+/* Returns by how much the keys of a brick are less than those of the centres. */
+static double lead_of(const trip_gaussian_stream_params *p, const trip_file_gaussian_brick *b)
+{
+    return p->reach > 0
+               ? p->reach * exp((double)b->log_hi) + fmax(0, corner_key(&p->spread, b, true))
+               : 0;
+}
+
 static bool has_keys(const trip_gaussian_stream_params *p)
 {
     return p->key_min != 0 || p->key_max != 0;
@@ -158,7 +166,9 @@ static int make_steps(steps *s, const trip_gaussian_set *set, const trip_gaussia
     trip_key *keys = (void *)(found + room), *scratch = keys + room;
     for (uint64_t i = 0; i < room; i++) {
         const trip_file_gaussian_brick *b = &list->bricks[i];
-        const step here = { corner_key(&p->key, b, false), corner_key(&p->key, b, true), i };
+        const double lead = lead_of(p, b);
+        const step here = { corner_key(&p->key, b, false) - lead,
+                            corner_key(&p->key, b, true) - lead, i };
         if (!is_wanted(p, b, &here))
             continue;
         keys[s->count] = (trip_key){ trip_key_of(here.lo), s->count };
@@ -218,6 +228,28 @@ static uint64_t window_of(const steps *s, const trip_gaussian_list *list)
     return most;
 }
 
+/* Returns the greatest number of splats that meet a plane while it makes a step. */
+static uint64_t held_of(const steps *s, const trip_gaussian_list *list,
+                        const trip_gaussian_stream_params *p)
+{
+    uint64_t held = 0, most = 0, gone = 0;
+    trip_key *leaving = (void *)(s->sorted + 2 * list->brick_count);
+    trip_key *scratch = leaving + list->brick_count;
+    for (uint64_t i = 0; i < s->count; i++) {
+        const double lead = lead_of(p, &list->bricks[s->sorted[i].brick]);
+        leaving[i] = (trip_key){ trip_key_of(s->sorted[i].hi + 2 * lead + p->hold), i };
+    }
+    trip_key_sort(leaving, scratch, s->count);
+    for (uint64_t i = 0; i < s->count; i++) {
+        const uint64_t lo = trip_key_of(s->sorted[i].lo);
+        for (; leaving[gone].key < lo; gone++)
+            held -= list->bricks[s->sorted[leaving[gone].number].brick].records;
+        held += list->bricks[s->sorted[i].brick].records;
+        most = held > most ? held : most;
+    }
+    return most;
+}
+
 /* Each step may have a chunk that is not full. */
 static uint64_t chunk_count(uint64_t bricks, uint64_t window)
 {
@@ -238,9 +270,12 @@ static uint64_t whole_pages(uint64_t bytes)
     return (bytes + 4095) / 4096 * 4096;
 }
 
-static trip_gaussian_plan plan_of(const steps *s, const trip_gaussian_list *list, int degree)
+static trip_gaussian_plan plan_of(const steps *s, const trip_gaussian_list *list,
+                                  const trip_gaussian_stream_params *p, int degree)
 {
-    trip_gaussian_plan plan = { .bricks = s->count, .window_records = window_of(s, list) };
+    trip_gaussian_plan plan = { .bricks = s->count,
+                                .window_records = window_of(s, list),
+                                .held_records = p->reach > 0 ? held_of(s, list, p) : 0 };
     for (uint64_t i = 0; i < s->count; i++)
         plan.records += list->bricks[s->sorted[i].brick].records;
     for (int n = 0; n <= degree; n++)
@@ -256,7 +291,7 @@ int trip_gaussian_stream_plan(const trip_gaussian_set *set,
     steps s;
     const int status = make_steps(&s, set, params, budget);
     if (status == TRIP_OK)
-        *plan = plan_of(&s, &set->lists[params->axis], degree_of(set, params));
+        *plan = plan_of(&s, &set->lists[params->axis], params, degree_of(set, params));
     free_steps(&s, budget);
     return status;
 }
@@ -344,7 +379,7 @@ int trip_gaussian_stream_open(trip_gaussian_stream **out, const trip_gaussian_se
     s->slot_bytes = slot_size(s->degree);
     int status = make_steps(&s->steps, set, params, budget);
     if (status == TRIP_OK) {
-        s->plan = plan_of(&s->steps, s->list, s->degree);
+        s->plan = plan_of(&s->steps, s->list, params, s->degree);
         status = take_memory(s);
     }
     if (status < 0) {
@@ -421,6 +456,7 @@ static int read_step(trip_gaussian_stream *s, uint64_t i)
 {
     const uint64_t brick = s->steps.sorted[i].brick;
     const trip_file_gaussian_brick *b = &s->list->bricks[brick];
+    const double lead = lead_of(&s->params, b);
     int status = TRIP_OK;
     read_ahead(s, i + READ_AHEAD);
     for (unsigned n = 0; n <= (unsigned)s->degree && status == TRIP_OK; n++)
@@ -429,7 +465,7 @@ static int read_step(trip_gaussian_stream *s, uint64_t i)
         double centre[3];
         trip_gaussian_decode_centre(b, s->planes[0] + (size_t)j * TRIP_GAUSSIAN_RECORD_BYTES,
                                     centre);
-        const double key = trip_gaussian_key_of(&s->params.key, centre);
+        const double key = trip_gaussian_key_of(&s->params.key, centre) - lead;
         if (!has_keys(&s->params) || (key >= s->params.key_min && key <= s->params.key_max))
             put(s, i, j, key);
     }

@@ -33,6 +33,12 @@ typedef struct trip_gaussian_stream_params {
     trip_gaussian_key key;
     /* Splats with other keys are left out. Both 0 means all keys. */
     double key_min, key_max;
+    /* Keys are less by `reach` times the largest deviation of the brick, plus the greatest value of
+     * `spread` in the brick: splats come in the order in which a plane meets them. Only for keys
+     * with a direction of unit length. `hold` is the length of a step of that plane, for
+     * trip_gaussian_plan.held_records. */
+    double reach, hold;
+    trip_gaussian_key spread;
     const trip_gaussian_plane *planes; /* at most TRIP_GAUSSIAN_PLANES_MAX */
     unsigned plane_count;
     int degree; /* of the spherical harmonics to read; above the scene's means the scene's */
@@ -61,8 +67,10 @@ double trip_gaussian_key_of(const trip_gaussian_key *key, const double centre[3]
 typedef struct trip_gaussian_plan {
     uint64_t bricks, records; /* that will be read */
     uint64_t window_records;  /* greatest number of splats in the window */
-    uint64_t bytes;           /* of memory that the stream takes from its budget */
-    uint64_t read_bytes;      /* from the disk */
+    /* With `reach`: greatest number of splats that meet the plane during a step. */
+    uint64_t held_records;
+    uint64_t bytes;      /* of memory that the stream takes from its budget */
+    uint64_t read_bytes; /* from the disk */
 } trip_gaussian_plan;
 
 /* Sets *plan. Takes 24 bytes a brick from the budget meanwhile. */
