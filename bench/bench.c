@@ -124,17 +124,37 @@ static int check_plot(const bench_options *o)
     return status;
 }
 
+/* Checks the options for a Gaussian scene. */
+static int check_scene(const bench_options *o)
+{
+    if (strcmp(o->table, "orders") != 0)
+        return trip_fail(TRIP_USAGE, "usage", o->input,
+                         "is a Gaussian scene; only the table orders measures it");
+    if (!o->usual || o->tf)
+        return trip_fail(TRIP_USAGE, "usage", o->input,
+                         "is a Gaussian scene; only --json, --memory, --repeat, --size and "
+                         "--threads apply");
+    if (o->renderers[0] != TRIP_RENDERER_CPU && o->renderers[0] != TRIP_RENDERER_AUTO)
+        return trip_option_fail("--renderer", "must be cpu for a Gaussian scene");
+    return 0;
+}
+
 static int measure(bench_options *o, bench_report *r)
 {
     const size_t table = table_of(o);
-    if (o->input && (trip_gaussian_set_is(o->input) || trip_gaussian_file_is(o->input)))
-        return trip_fail(TRIP_USAGE, "usage", o->input,
-                         "is a Gaussian scene; `triptych render` draws it");
+    const bool scene = o->input && trip_gaussian_set_is(o->input);
+    int status = scene ? check_scene(o) : 0;
+    if (o->input && !scene && trip_gaussian_file_is(o->input))
+        status = trip_fail(TRIP_USAGE, "usage", o->input,
+                           "is a Gaussian scene; `triptych brick` makes a data set of it");
+    if (status)
+        return status;
     if (!o->input && tables[table].makes_volumes)
         bench_options_choose(o, false);
     o->progress = command_line_quiet() ? NULL : measure_progress_start(o->table);
-    int status = !o->input && tables[table].makes_volumes ? tables[table].run(NULL, o, r)
-                                                          : measure_data(o, table, r);
+    status = scene                                      ? bench_gaussians(o, r)
+             : !o->input && tables[table].makes_volumes ? tables[table].run(NULL, o, r)
+                                                        : measure_data(o, table, r);
     measure_progress_end(o->progress);
     return status;
 }

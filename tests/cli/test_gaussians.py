@@ -340,6 +340,21 @@ class Gaussians(program.ProgramTest):
             self.assertEqual(names, [b"Z"])
             self.assertAlmostEqual(float(z[4, 4, 0]), 4, delta=1e-3)
 
+    # ---- measuring ----
+
+    def test_bench_times_the_orders_and_a_sort(self):
+        data = self.scene("bench", many(20000))
+        report = json.loads(self.works("bench", "orders", data, "--size", "64", "--repeat", "1", "--json").stdout)
+        orders = {row["order"]: row for row in report["tables"]["orders"]}
+        self.assertEqual(list(orders), ["depth", "lists", "sheets", "integral"])
+        for name, row in orders.items():
+            self.assertGreater(row["ms"], 0)
+            self.assertGreaterEqual(row["bytes_read"], 24 * row["gaussians"], name)
+        self.assertEqual(orders["depth"]["gaussians"], 20000)
+        rows = report["tables"]["sort"]
+        self.assertEqual(rows[-1]["gaussians"], 20000)
+        self.assertEqual({row["same"] for row in rows}, {"yes"})
+
     # ---- runs ----
 
     def test_threads_and_memory_change_no_bit(self):
@@ -465,10 +480,15 @@ class Gaussians(program.ProgramTest):
     def test_commands_for_volumes_refuse_scenes(self):
         data = self.scene("refused", [row((0, 0, 0))])
         for name in data, "refused.ply":
-            for command in ("view", name), ("serve", name), ("accuracy", name, "-o", "r"), \
-                           ("bench", "stream", name):
+            for command in ("view", name), ("serve", name):
                 self.leaves_nothing(2, *command,
                                     says=f"{name}: is a Gaussian scene; `triptych render` draws it")
+        self.leaves_nothing(2, "bench", "stream", data, says="only the table orders measures it")
+        self.leaves_nothing(2, "bench", "orders", data, "--tf", "bone", says="is a Gaussian scene")
+        self.leaves_nothing(2, "bench", "orders", data, "--no-shading", says="is a Gaussian scene")
+        self.leaves_nothing(2, "bench", "orders", data, "--renderer", "reference", says="must be cpu")
+        for command in "bench orders", "accuracy":
+            self.leaves_nothing(2, *command.split(), "refused.ply", says="`triptych brick` makes a data set of it")
         self.fails(2, "render", data, data, "-o", "a.png", says="give one scene at a time")
         self.fails(2, "tf", "show", data, says="is a Gaussian scene")
         self.leaves_nothing(2, "brick", data, "-o", "b.trip", says="is a data set already")
