@@ -16,6 +16,9 @@
 
 enum { ORDERS = 4, INTEGRAL = 3, PAIRS = ORDERS * (ORDERS - 1) / 2, SHOWN_PX = 512 };
 
+/* Every fourth view of views.h is a whole view in perspective. */
+enum { KIND = 4 };
+
 static const char *const order_names[ORDERS] = { "depth", "lists", "sheets", "integral" };
 static const char *const order_options[ORDERS] = { "--order depth", "--order lists",
                                                    "--order sheets", "--renderer integral" };
@@ -107,10 +110,10 @@ static int draw(measured *m, int order)
 /* Draws a view: an order as often as --repeat says, the integral once. */
 static int draw_view(measured *m, int view)
 {
-    int status =
-        accuracy_view_find(m->cpu, m->o->width, m->o->height, view, m->o->views, &m->views[view])
-            ? fail(m->cpu)
-            : 0;
+    int status = accuracy_view_find(m->cpu, m->o->width, m->o->height, KIND * view,
+                                    KIND * m->o->views, &m->views[view])
+                     ? fail(m->cpu)
+                     : 0;
     if (!status && accuracy_view_use(m->cpu, &m->views[view]))
         status = fail(m->cpu);
     if (!status && accuracy_view_use(m->integral, &m->views[view]))

@@ -424,9 +424,9 @@ static const trip_option rows[DRAW_OPTIONS] = {
                      .group = DRAW_GROUP_INTEGRAL, .measured = true, AT(integral.field),
                      CHOICE(fields) },
     [DRAW_TOLERANCE] = { "tolerance", "E", "Bounds the error of each component of a pixel",
-                         "1e-3, and 1e-4 with --samples", .group = DRAW_GROUP_INTEGRAL,
-                         .measured = true, .type = TRIP_OPTION_NUMBER, AT(integral.tolerance),
-                         .lo = 1e-12, .hi = 0.1 },
+                         "1e-3; with --samples 1e-4; for Gaussian scenes 5e-5",
+                         .group = DRAW_GROUP_INTEGRAL, .measured = true, .type = TRIP_OPTION_NUMBER,
+                         AT(integral.tolerance), .lo = 1e-12, .hi = 0.1 },
     [DRAW_COMPOSITING] = { "compositing", "splat|sheet",
                            "Selects the unit of compositing: each splat in list order, or the sum "
                            "of the splats of a sheet",
@@ -493,7 +493,7 @@ static const trip_option rows[DRAW_OPTIONS] = {
     [DRAW_SHEET] = { "sheet", "LENGTH",
                      "Sets the thickness of the sheets in units of the scene; thinner ones come "
                      "closer to the integral and take longer",
-                     "a 512th of the scene's radius", "requires --order sheets",
+                     "a 1024th of the scene's radius", "requires --order sheets",
                      .group = DRAW_GROUP_ACCURACY, .measured = true, .type = TRIP_OPTION_NUMBER,
                      AT(scene.sheet), .lo = 1e-12, .hi = 1e12 },
     [DRAW_HARMONICS] = { "sh", "DEGREE",

@@ -90,6 +90,8 @@ static const struct rule {
       0, 0, "does not apply to --renderer integral, which has no layers", IDLE },
     { ROW(ORDER) | ROW(SHEET), RENDERER(INTEGRAL), 0, 0,
       "does not apply to --renderer integral, which has no order", IDLE },
+    { ROW(ORDER), RENDERER(GL), BY_SHEETS, 0, "sheets requires --renderer cpu or reference",
+      CONFLICT },
     { ROW(SHEET), ALL, 0, BY_SHEETS, "requires --order sheets", IDLE },
     { ROW(SHOW), RENDERER(INTEGRAL), DEBUG_VIEW, 0,
       "does not apply to --renderer integral, which has no lists and no levels", CONFLICT },

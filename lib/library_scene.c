@@ -149,7 +149,7 @@ static bool has_lists(const triptych *t)
 static double sheet_of(const triptych *t)
 {
     const trip_file_gaussian_header *h = &t->scene->header;
-    enum { SHEETS_IN_RADIUS = 512 };
+    enum { SHEETS_IN_RADIUS = 1024 };
     double sum = 0;
     if (t->given.scene.order != TRIPTYCH_ORDER_SHEETS)
         return 0;

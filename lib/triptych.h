@@ -108,7 +108,7 @@ typedef enum triptych_renderer {
     TRIPTYCH_RENDERER_CPU,
     TRIPTYCH_RENDERER_REFERENCE, /* double precision, slow */
     /* The integral along each ray in double precision, which all other renderers approximate.
-     * Slowest. The whole volume must fit in memory, at 16 bytes per voxel. Of a Gaussian scene, all
+     * Slowest. The whole volume must fit in memory, at 16 bytes per voxel. In a Gaussian scene, the
      * Gaussians in view must fit, at 352 bytes each. */
     TRIPTYCH_RENDERER_INTEGRAL,
 } triptych_renderer;
@@ -494,7 +494,8 @@ typedef enum triptych_field {
 typedef struct triptych_integral_settings {
     triptych_field field;
     /* Bound of the error of each component of a pixel, 1e-12 to 0.1. The default is 1e-3 for the
-     * mean over the area of each pixel, and 1e-4 for a number of rays per pixel. */
+     * mean over the area of each pixel, 1e-4 for a number of rays per pixel, and 5e-5 for a Gaussian
+     * scene. */
     double tolerance;
 } triptych_integral_settings;
 

@@ -34,7 +34,7 @@ typedef struct layer {
 
 struct trip_gaussian_frame {
     trip_gaussian_frame_params params;
-    /* If one of these is not NULL, it draws the frame. */
+    /* Draw the frame if they are not NULL. */
     trip_gaussian_integral *integral;
     trip_gaussian_sheet_frame *sheets;
     trip_settings weights; /* of the order by lists */

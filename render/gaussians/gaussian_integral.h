@@ -1,7 +1,7 @@
-/* Draws one picture of a Gaussian scene as the integral of overlapping Gaussians: along the ray of
- * each pixel, the emission-absorption integral of the sum of their densities (gaussian_profile.h).
- * Where Gaussians overlap, the colour is the mean of theirs, weighted by density. There is no order
- * and there are no sheets. The orders by sheets approximate this picture.
+/* Draws one picture of a Gaussian scene as the emission-absorption integral of overlapping
+ * Gaussians. The ray of each pixel passes through the sum of their densities (gaussian_profile.h).
+ * Overlapping Gaussians mix their colours by density. There is no order and there are no sheets.
+ * The order by sheets approximates this picture.
  *
  * All Gaussians in view are kept in memory. A ray is divided adaptively, until at most one density
  * is thinner than an interval. The optical depth up to each point has a closed form. The colour of

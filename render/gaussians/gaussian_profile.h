@@ -3,18 +3,26 @@
  *
  * A Gaussian with the opacity alpha at a pixel (gaussian_picture.h) has the optical depth
  * tau = -ln(1 - alpha) there. A Gaussian alone then has the same picture in every order. Along the
- * ray, tau is distributed as a normal density of the depth z. The density has the mean and the
- * deviation of the Gaussian along the ray, after the low-pass filter of the footprint has widened
- * the Gaussian parallel to the picture. Without the filter, the mean is the place of the greatest
- * density along the ray, and the deviation is 1 / |diag(1 / s) R^T r(p)|.
+ * ray, tau is distributed as a normal density of the depth z. Its mean and deviation are the ones
+ * of the Gaussian along the ray. Before, the low-pass filter of the footprint widens the Gaussian
+ * parallel to the picture. Without the filter, the mean is the place of the greatest density along
+ * the ray, and the deviation is 1 / |diag(1 / s) R^T r(p)|. With the filter, a thin Gaussian that
+ * is seen from the side keeps its depth at the pixels beside it.
  *
- * Let z' be the depth of the centre, d the pixel's distance from it, J and S2 as for the exact
- * footprint in gaussian_picture.h (J is not limited), q = d^T S2^-1 d, v = forward^T S forward and
- * k = J S forward. Then:
+ * J and S2 are the ones of the exact footprint in gaussian_picture.h: J is not limited. z' is the
+ * depth of the centre, and d the distance of the pixel from it.
  *
- *     G = d^T S2^-1 k,   V = v - k^T S2^-1 k
- *     mean = z' h z' / (h^2 + V q),  deviation = z' sqrt(V / (h^2 + V q)),  h = z' - G
- *     in parallel views:  mean = z' + G,  deviation = sqrt(V)
+ *     k = J S forward,   G = d^T S2^-1 k
+ *     v = forward^T S forward,   V = v - k^T S2^-1 k
+ *     q = d^T S2^-1 d,   h = z' - G
+ *
+ * The density has this mean and deviation in perspective:
+ *
+ *     z' h z' / (h^2 + V q),   z' sqrt(V / (h^2 + V q))
+ *
+ * It has these in parallel views:
+ *
+ *     z' + G,   sqrt(V)
  *
  * Only a flat Gaussian that faces the eye has the deviation 0. The part of a density behind the eye
  * counts as if it were at the eye. */

@@ -43,7 +43,7 @@ typedef struct trip_ray_scratch {
 size_t trip_ray_scratch_bytes(size_t room);
 trip_ray_scratch trip_ray_scratch_in(void *memory, size_t room);
 
-/* Integrates s->parts[0 .. count - 1]. What lies at depths below `from` counts as if it were at
+/* Integrates s->parts[0 .. count - 1]. Densities at depths below `from` count as if they were at
  * `from`. Writes premultiplied colour and opacity. */
 void trip_ray_integrate(const trip_normal_table *t, trip_ray_scratch *s, size_t count, double from,
                         double tolerance, double rgba[4]);

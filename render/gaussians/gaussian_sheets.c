@@ -55,7 +55,7 @@ struct trip_gaussian_sheets {
     size_t added_count;
 
     size_t tile_first, tile_last; /* the tiles that are drawn at once */
-    uint32_t *pairs;              /* Gaussians of each of these tiles, in their order */
+    uint32_t *pairs;              /* Gaussians of each tile, in the order of adding */
     size_t pairs_max;
     uint32_t *pair_count, *pair_first; /* by tile */
 };

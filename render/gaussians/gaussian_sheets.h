@@ -4,9 +4,9 @@
  *
  * A Gaussian shares out its optical depth over the sheets that its ellipsoid reaches, widened by
  * the low-pass filter. The integral of its density along each pixel's ray decides
- * (gaussian_profile.h). The first and the last of these sheets also get what lies before and
- * behind. In perspective, the first sheet is the eye's. A sheet sums its optical depths tau and
- * colours c, so no order inside it matters:
+ * (gaussian_profile.h). The first and the last one also get the density before and behind. In
+ * perspective, the first sheet is the eye's. A sheet sums its optical depths tau and colours c, so
+ * no order inside it matters:
  *
  *     colour = sum(tau c) / sum(tau) (1 - exp(-sum(tau))),   T *= exp(-sum(tau))
  *
@@ -51,8 +51,8 @@ double trip_gaussian_sheets_spread(const trip_camera *c, int axis);
 size_t trip_gaussian_sheets_bytes(const trip_gaussian_sheets_params *p);
 /* Fails (reported) if the budget is too small. */
 int trip_gaussian_sheets_begin(trip_gaussian_sheets **out, const trip_gaussian_sheets_params *p);
-/* Adds Gaussians, in any order. Those that reach into sheets already drawn count in the next one.
- * `count` may be at most the room that is left. */
+/* Adds Gaussians, in any order. A Gaussian that ends in a drawn sheet counts in the next
+ * one. `count` may be at most the room that is left. */
 int trip_gaussian_sheets_add(trip_gaussian_sheets *g, const trip_gaussian *gaussians, size_t count);
 size_t trip_gaussian_sheets_room_left(const trip_gaussian_sheets *g);
 /* Draws the next run of sheets that hold Gaussians, if it ends before a coordinate. All Gaussians

@@ -3,7 +3,8 @@
 #ifndef TRIP_SHEETS_TMPL_H
 #define TRIP_SHEETS_TMPL_H
 
-/* A sheet's sums at each pixel: of the optical depths, and of these times colour and depth. */
+/* The sums of a sheet at each pixel: of optical depth, and of optical depth times colour or depth.
+ */
 enum { SUM_TAU, SUM_RED, SUM_GREEN, SUM_BLUE, SUM_DEPTH, SUMS };
 
 /* The sums of a run in a tile. A block is cleared when a splat first meets it. */

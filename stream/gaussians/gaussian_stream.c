@@ -124,7 +124,7 @@ static bool is_behind(const trip_gaussian_plane *p, const trip_file_gaussian_bri
     return corner_key(&key, b, true) + p->reach * radius < 0;
 }
 
-/* Returns by how much the keys of a brick are less than those of the centres. */
+/* Returns the keys of a brick's centres minus the keys of its splats. */
 static double lead_of(const trip_gaussian_stream_params *p, const trip_file_gaussian_brick *b)
 {
     return p->reach > 0

@@ -34,9 +34,9 @@ typedef struct trip_gaussian_stream_params {
     /* Splats with other keys are left out. Both 0 means all keys. */
     double key_min, key_max;
     /* Keys are less by `reach` times the largest deviation of the brick, plus the greatest value of
-     * `spread` in the brick: splats come in the order in which a plane meets them. Only for keys
-     * with a direction of unit length. `hold` is the length of a step of that plane, for
-     * trip_gaussian_plan.held_records. */
+     * `spread` in the brick. So splats come in the order in which a plane meets them. Only for keys
+     * with a direction of unit length. trip_gaussian_plan.held_records counts for a plane that
+     * makes steps of the length `hold`. */
     double reach, hold;
     trip_gaussian_key spread;
     const trip_gaussian_plane *planes; /* at most TRIP_GAUSSIAN_PLANES_MAX */

@@ -345,15 +345,40 @@ class Gaussians(program.ProgramTest):
     def test_bench_times_the_orders_and_a_sort(self):
         data = self.scene("bench", many(20000))
         report = json.loads(self.works("bench", "orders", data, "--size", "64", "--repeat", "1", "--json").stdout)
-        orders = {row["order"]: row for row in report["tables"]["orders"]}
+        orders = {row["order"]: row for row in report["tables"]["orders"]["rows"]}
         self.assertEqual(list(orders), ["depth", "lists", "sheets", "integral"])
         for name, row in orders.items():
             self.assertGreater(row["ms"], 0)
             self.assertGreaterEqual(row["bytes_read"], 24 * row["gaussians"], name)
         self.assertEqual(orders["depth"]["gaussians"], 20000)
-        rows = report["tables"]["sort"]
+        rows = report["tables"]["sort"]["rows"]
         self.assertEqual(rows[-1]["gaussians"], 20000)
         self.assertEqual({row["same"] for row in rows}, {"yes"})
+
+    def test_accuracy_compares_the_orders(self):
+        """Two Gaussians at one place have a closed form in each order; the first one of equals is in front."""
+        rows = [row((0, 0, 0), (1, 0, 0), 0.5), row((0, 0, 0), (0, 1, 0), 0.5)]
+        data = self.scene("pair", rows)
+        shutil.rmtree("pair.accuracy", ignore_errors=True)
+        run = self.works("accuracy", data, "--size", "32", "--views", "2", "--repeat", "1")
+        self.assertIn("sheets, integral", run.stdout.decode())
+        with open("pair.accuracy/accuracy.json") as file:
+            report = json.load(file)
+        pairs = {r["pair"]: r for r in report["differences"]}
+        self.assertEqual(len(pairs), 6)
+        # At the centre: red 0.5 and green 0.25 over one another, 0.375 each as a mixture.
+        for pair in "depth, sheets", "depth, integral", "lists, sheets", "lists, integral":
+            self.assertAlmostEqual(pairs[pair]["max"], 255 * 0.125, delta=2, msg=pair)
+        for pair in "depth, lists", "sheets, integral":
+            self.assertLess(pairs[pair]["max"], 0.05, pair)
+        self.assertTrue(all(r["ms"] > 0 for r in report["orders"]))
+        with open("pair.accuracy/index.html") as file:
+            self.assertEqual(file.read().count("<img"), 4 + 6)
+        with open("pair.accuracy/accuracy.csv") as file:
+            self.assertEqual(len(file.read().split()), 5 + 6 + 7)
+        for options in ("--source", "a.nrrd"), ("--steps",), ("--settings", "all"), ("--tolerance", "1e-3"), \
+                       ("--budget", "3"), ("--compare", "none"), ("--no-shading",), ("--tf", "bone"):
+            self.leaves_nothing(2, "accuracy", data, "-o", "r", *options, says="does not apply to Gaussian scenes")
 
     # ---- runs ----
 
