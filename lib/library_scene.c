@@ -90,6 +90,41 @@ trip_view_object trip_context_scene_object(const triptych *t)
 
 /* ---- frames ---- */
 
+static bool has_lists(const triptych *t)
+{
+    return t->given.scene.order >= TRIPTYCH_ORDER_LISTS;
+}
+
+/* Returns half the diagonal of the typical bounds, or of one Gaussian. */
+static double radius_of(const triptych *t)
+{
+    const trip_view_object o = trip_context_scene_object(t);
+    double sum = 0;
+    for (int a = 0; a < 3; a++)
+        sum += (o.hi[a] - o.lo[a]) * (o.hi[a] - o.lo[a]);
+    return sum > 0 ? sqrt(sum) / 2 : 1;
+}
+
+/* Returns the thickness of the sheets, or 0 for other orders. */
+static double sheet_of(const triptych *t)
+{
+    enum { SHEETS_IN_RADIUS = 1024 };
+    if (t->given.scene.order != TRIPTYCH_ORDER_SHEETS)
+        return 0;
+    return t->given.scene.sheet > 0 ? t->given.scene.sheet : radius_of(t) / SHEETS_IN_RADIUS;
+}
+
+/* So thin sheets would take hours and show nothing more. */
+static int check_sheet(const triptych *t)
+{
+    enum { SHEETS_MAX = 1 << 17 };
+    const double least = radius_of(t) / SHEETS_MAX, sheet = sheet_of(t);
+    return sheet > 0 && sheet < least
+               ? trip_fail(TRIP_USAGE, "usage", "--sheet",
+                           "%g is too thin for this scene; give at least %.3g", sheet, least)
+               : 0;
+}
+
 static int check(const triptych *t)
 {
     triptych_renderer r = t->resources.renderer;
@@ -102,7 +137,8 @@ static int check(const triptych *t)
         return trip_option_fail("--kernel", "fixed does not apply to Gaussian scenes");
     if (t->given.all.method == TRIPTYCH_METHOD_IMAGE)
         return trip_option_fail("--method", "image does not apply to Gaussian scenes");
-    return draw_settings_check_kind(&t->given, true);
+    const int status = draw_settings_check_kind(&t->given, true);
+    return status ? status : check_sheet(t);
 }
 
 static int make_camera(triptych *t, int side)
@@ -138,27 +174,6 @@ static trip_gaussian_settings settings_of(const triptych *t)
         out.degree = (int)t->scene->header.degree;
     memcpy(out.background, t->settings.background, sizeof out.background);
     return out;
-}
-
-static bool has_lists(const triptych *t)
-{
-    return t->given.scene.order >= TRIPTYCH_ORDER_LISTS;
-}
-
-/* Returns the thickness of the sheets, or 0 for other orders. */
-static double sheet_of(const triptych *t)
-{
-    const trip_file_gaussian_header *h = &t->scene->header;
-    enum { SHEETS_IN_RADIUS = 1024 };
-    double sum = 0;
-    if (t->given.scene.order != TRIPTYCH_ORDER_SHEETS)
-        return 0;
-    if (t->given.scene.sheet > 0)
-        return t->given.scene.sheet;
-    const trip_view_object o = trip_context_scene_object(t);
-    for (int a = 0; a < 3; a++)
-        sum += (o.hi[a] - o.lo[a]) * (o.hi[a] - o.lo[a]);
-    return sum > 0 ? sqrt(sum) / 2 / SHEETS_IN_RADIUS : fmax(1, fabs(h->centre_lo[0])) * 1e-6;
 }
 
 /* Takes the picture of several rays per pixel. */

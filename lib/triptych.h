@@ -599,7 +599,7 @@ typedef enum triptych_harmonics {
 typedef struct triptych_scene_settings {
     triptych_order order;
     triptych_harmonics harmonics;
-    /* Thickness of a sheet in units of the scene; for the order by sheets. The default is a 512th
+    /* Thickness of a sheet in units of the scene; for the order by sheets. The default is a 1024th
      * of the scene's radius, half the diagonal of its typical bounds. */
     double sheet;
 } triptych_scene_settings;

@@ -524,6 +524,8 @@ class Gaussians(program.ProgramTest):
                        ("--error", "1"), ("--kernel", "fixed"), ("--tf", "bone"), \
                        ("--effects", "shadows"), ("--renderer", "gl"), ("--sheet", "0.1"), \
                        ("--order", "lists", "--sheet", "0.1"), ("--sheet", "0", "--order", "sheets"), \
+                       ("--sheet", "1e-8", "--order", "sheets"), \
+                       ("--renderer", "gl", "--order", "sheets"), \
                        ("--renderer", "integral", "--order", "sheets"), \
                        ("--renderer", "integral", "--depth", "d.exr"), \
                        ("--renderer", "integral", "--kernel", "exact"), ("--tolerance", "1e-3"), \
