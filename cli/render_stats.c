@@ -249,10 +249,15 @@ static void add_interpolation(cJSON *root, triptych_interpolation drawn)
                                 draw_settings_choice(&s, DRAW_INTERPOLATION));
 }
 
-static void add_scene_method(cJSON *root, const draw_settings *s, const triptych_frame_stats *frame)
+static void add_scene_method(cJSON *root, const render_options *o,
+                             const triptych_frame_stats *frame)
 {
+    const draw_settings by_depth = { .scene.order = TRIPTYCH_ORDER_DEPTH };
+    const draw_settings *s = o->settings.scene.order ? &o->settings : &by_depth;
     cJSON_AddStringToObject(root, "order",
-                            s->scene.order == TRIPTYCH_ORDER_LISTS ? "lists" : "depth");
+                            o->resources.renderer == TRIPTYCH_RENDERER_INTEGRAL
+                                ? "integral"
+                                : draw_settings_choice(s, DRAW_ORDER));
     cJSON_AddStringToObject(root, "kernel",
                             frame->footprint
                                 ? footprint_names[frame->footprint - TRIPTYCH_FOOTPRINT_EXACT]
@@ -296,7 +301,7 @@ int render_stats_describe(render_stats *s, const render_options *o, triptych *t)
     cJSON_AddStringToObject(root, "renderer", frame.renderer);
     cJSON_AddStringToObject(root, "device", frame.device);
     if (triptych_is_scene(t))
-        add_scene_method(root, &o->settings, &frame);
+        add_scene_method(root, o, &frame);
     else
         add_method(root, o, &frame);
     if (frame.lod_px > 0)

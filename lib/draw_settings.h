@@ -92,6 +92,7 @@ enum {
     DRAW_TRAVERSAL,
     DRAW_WEIGHTS,
     DRAW_ORDER,
+    DRAW_SHEET,
     DRAW_HARMONICS, /* named "sh" */
     DRAW_OPTIONS
 };

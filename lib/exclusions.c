@@ -40,6 +40,7 @@ enum {
     MAY_EMIT = 1 << 26,
     NEAREST = 1 << 27,
     UNFILTERED = 1 << 28,
+    BY_SHEETS = 1 << 29,
 };
 
 static const uint64_t of_splats =
@@ -87,6 +88,13 @@ static const struct rule {
       "does not apply to --renderer integral; use --tolerance", IDLE },
     { ROW(METHOD) | ROW(H) | ROW(WEIGHTS) | ROW(TRAVERSAL) | ROW(COMPOSITING), RENDERER(INTEGRAL),
       0, 0, "does not apply to --renderer integral, which has no layers", IDLE },
+    { ROW(ORDER) | ROW(SHEET), RENDERER(INTEGRAL), 0, 0,
+      "does not apply to --renderer integral, which has no order", IDLE },
+    { ROW(ORDER), RENDERER(GL), BY_SHEETS, 0, "sheets requires --renderer cpu or reference",
+      CONFLICT },
+    { ROW(SHEET), ALL, 0, BY_SHEETS, "requires --order sheets", IDLE },
+    { ROW(LOD), ALL, BY_SHEETS, 0, "does not apply to --order sheets, which draws the finest level",
+      IDLE },
     { ROW(SHOW), RENDERER(INTEGRAL), DEBUG_VIEW, 0,
       "does not apply to --renderer integral, which has no lists and no levels", CONFLICT },
     { of_levels, RENDERER(INTEGRAL), 0, 0,
@@ -213,6 +221,7 @@ static int facts_of(const draw_settings *s)
            (s->integral.field == TRIPTYCH_FIELD_SPLATS ? FIELD_OF_SPLATS : 0) |
            (s->all.show > TRIPTYCH_SHOW_PICTURE ? DEBUG_VIEW : 0) |
            (s->all.show == TRIPTYCH_SHOW_MERGE ? SHOW_MERGE : 0) |
+           (s->scene.order == TRIPTYCH_ORDER_SHEETS ? BY_SHEETS : 0) |
            (s->all.count_exactly ? COUNTED : 0) | (s->all.samples > 1 ? SEVERAL_SAMPLES : 0) |
            facts_of_splats(s) | facts_of_effects(s);
 }
@@ -313,10 +322,10 @@ int draw_settings_check(const draw_settings *s, triptych_renderer *renderer, boo
 
 /* ---- kinds of data ---- */
 
-static const uint64_t of_scenes = ROW(ORDER) | ROW(HARMONICS);
-static const uint64_t of_both = ROW(BACKGROUND) | ROW(CLIP_BOX) | ROW(CLIP_PLANE) |
-                                ROW(EARLY_TERMINATION) | ROW(FOOTPRINT) | ROW(SAMPLES) |
-                                ROW(DEPTH) | ROW(NORMALISE) | ROW(METHOD) | ROW(H) | ROW(LOD);
+static const uint64_t of_scenes = ROW(ORDER) | ROW(SHEET) | ROW(HARMONICS);
+static const uint64_t of_both =
+    ROW(BACKGROUND) | ROW(CLIP_BOX) | ROW(CLIP_PLANE) | ROW(EARLY_TERMINATION) | ROW(FOOTPRINT) |
+    ROW(SAMPLES) | ROW(DEPTH) | ROW(NORMALISE) | ROW(METHOD) | ROW(H) | ROW(LOD) | ROW(TOLERANCE);
 
 /* A scene does not have these choices, for these reasons. */
 static const struct choice {
@@ -366,8 +375,6 @@ static const struct choice *find_choice_not_of_scenes(const draw_settings *s)
 /* Scenes are read by pread, and every Gaussian in view is drawn until its pixels are full. */
 static int check_resources_of_scenes(const triptych_resources *r)
 {
-    if (r->renderer == TRIPTYCH_RENDERER_INTEGRAL)
-        return trip_option_fail("--renderer", "must be cpu, gl or reference for Gaussian scenes");
     if (r->engine != TRIPTYCH_ENGINE_AUTO && r->engine != TRIPTYCH_ENGINE_PREAD)
         return trip_option_fail("--engine", "must be pread for Gaussian scenes");
     if (r->read_occluded)

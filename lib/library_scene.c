@@ -1,5 +1,6 @@
 /* Gaussian scenes: opening, views and frames (triptych.h). */
 #include <float.h>
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -94,6 +95,50 @@ trip_view_object trip_context_scene_object(const triptych *t)
 /* Gaussians wider than a pixel are drawn as they are. */
 #define DEFAULT_LOD_PX 1.0
 
+static bool has_lists(const triptych *t)
+{
+    return t->given.scene.order >= TRIPTYCH_ORDER_LISTS;
+}
+
+/* Returns half the diagonal of the typical bounds, or of one Gaussian. */
+static double radius_of(const triptych *t)
+{
+    const trip_view_object o = trip_context_scene_object(t);
+    double sum = 0;
+    for (int a = 0; a < 3; a++)
+        sum += (o.hi[a] - o.lo[a]) * (o.hi[a] - o.lo[a]);
+    return sum > 0 ? sqrt(sum) / 2 : 1;
+}
+
+/* Returns the thickness of the sheets, or 0 for other orders. */
+static double sheet_of(const triptych *t)
+{
+    enum { SHEETS_IN_RADIUS = 1024 };
+    if (t->given.scene.order != TRIPTYCH_ORDER_SHEETS)
+        return 0;
+    return t->given.scene.sheet > 0 ? t->given.scene.sheet : radius_of(t) / SHEETS_IN_RADIUS;
+}
+
+/* So thin sheets would take hours and show nothing more. */
+static int check_sheet(const triptych *t)
+{
+    enum { SHEETS_MAX = 1 << 17 };
+    const double least = radius_of(t) / SHEETS_MAX, sheet = sheet_of(t);
+    return sheet > 0 && sheet < least
+               ? trip_fail(TRIP_USAGE, "usage", "--sheet",
+                           "%g is too thin for this scene; give at least %.3g", sheet, least)
+               : 0;
+}
+
+static int check(const triptych *t)
+{
+    triptych_renderer r = t->resources.renderer;
+    if (r == TRIPTYCH_RENDERER_INTEGRAL && draw_settings_check(&t->given, &r, false))
+        return TRIP_USAGE;
+    const int status = draw_settings_check_kind(&t->given, &t->resources, true);
+    return status ? status : check_sheet(t);
+}
+
 static int make_camera(triptych *t, int side)
 {
     const trip_affine identity = trip_affine_identity();
@@ -174,11 +219,10 @@ static double lod_of(const triptych *t)
 
 int trip_context_begin_scene(triptych *t)
 {
-    const bool reference = t->resources.renderer == TRIPTYCH_RENDERER_REFERENCE;
     const int side = t->given.all.samples > 0 ? t->given.all.samples : 1;
     int status = trip_context_check_idle(t, true);
     if (!status)
-        status = draw_settings_check_kind(&t->given, &t->resources, true);
+        status = check(t);
     if (!status && !t->has_view)
         status = trip_context_find_view(t, &(triptych_view){ 0 });
     if (!status && !t->renderer) /* lends its threads */
@@ -200,8 +244,11 @@ int trip_context_begin_scene(triptych *t)
         .camera = &t->camera,
         .settings = settings_of(t),
         .lod_px = lod_of(t) * side,
-        .by_lists = t->given.scene.order == TRIPTYCH_ORDER_LISTS ? &t->drawn_settings : NULL,
-        .reference = reference,
+        .by_lists = has_lists(t) ? &t->drawn_settings : NULL,
+        .sheet = sheet_of(t),
+        .reference = t->resources.renderer == TRIPTYCH_RENDERER_REFERENCE,
+        .integral = t->resources.renderer == TRIPTYCH_RENDERER_INTEGRAL,
+        .tolerance = t->given.integral.tolerance,
         .device = device_of(t),
         .budget = t->session.budget,
         .runner = trip_renderer_runner(t->renderer),
@@ -214,11 +261,19 @@ int trip_context_begin_scene(triptych *t)
     return status;
 }
 
+static const char *renderer_name(triptych_renderer r)
+{
+    return r == TRIPTYCH_RENDERER_REFERENCE  ? "reference"
+           : r == TRIPTYCH_RENDERER_INTEGRAL ? "integral"
+           : r == TRIPTYCH_RENDERER_GL       ? "gl"
+                                             : "cpu";
+}
+
 static triptych_frame_stats stats_of(const triptych *t)
 {
     const trip_gaussian_frame_stats s = trip_gaussian_frame_get_stats(t->scene_frame);
     const trip_gaussian_settings settings = settings_of(t);
-    const bool reference = t->resources.renderer == TRIPTYCH_RENDERER_REFERENCE;
+    const triptych_renderer r = t->resources.renderer;
     return (triptych_frame_stats){
         .ms = trip_now_ms() - t->begun_ms,
         .wait_ms = s.read_ms,
@@ -230,10 +285,8 @@ static triptych_frame_stats stats_of(const triptych *t)
         .reads = s.bricks,
         .memory_bytes = trip_budget_limit_bytes(t->session.budget),
         .peak_memory_bytes = trip_budget_peak_bytes(t->session.budget),
-        .renderer = reference        ? "reference"
-                    : draws_by_gl(t) ? "gl"
-                                     : "cpu",
-        .device = reference ? "CPU, double precision, 1 thread" : t->device,
+        .renderer = renderer_name(r),
+        .device = r == TRIPTYCH_RENDERER_REFERENCE ? "CPU, double precision, 1 thread" : t->device,
         .engine = "pread",
         .ring = "not used: Gaussians come from windows",
         .classify = TRIPTYCH_CLASSIFY_PRE,
@@ -299,10 +352,17 @@ void trip_context_explain_scene(const triptych *t, FILE *out)
 {
     const trip_gaussian_frame_stats s = trip_gaussian_frame_get_stats(t->scene_frame);
     const trip_gaussian_settings settings = settings_of(t);
-    const bool lists = t->given.scene.order == TRIPTYCH_ORDER_LISTS;
+    const bool integral = t->resources.renderer == TRIPTYCH_RENDERER_INTEGRAL;
     fprintf(out, "scene       %llu Gaussians, harmonics up to degree %d of %u\n",
             (unsigned long long)t->scene->header.records, settings.degree, t->scene->header.degree);
-    if (lists)
+    if (integral)
+        fprintf(out, "order       none: the integral of overlapping Gaussians along each ray\n");
+    else if (sheet_of(t) > 0)
+        fprintf(out,
+                "order       by sheets %.4g thick, in %u passes: at most %llu Gaussians meet a "
+                "sheet at a time\n",
+                sheet_of(t), s.layers, (unsigned long long)s.window_records);
+    else if (has_lists(t))
         fprintf(out, "order       by lists: %u of 3 have weight in the picture\n", s.layers);
     else
         fprintf(out, "order       by depth: at most %llu Gaussians wait in the window\n",

@@ -108,7 +108,8 @@ typedef enum triptych_renderer {
     TRIPTYCH_RENDERER_CPU,
     TRIPTYCH_RENDERER_REFERENCE, /* double precision, slow */
     /* The integral along each ray in double precision, which all other renderers approximate.
-     * Slowest. The whole volume must fit in memory, at 16 bytes per voxel. */
+     * Slowest. The whole volume must fit in memory, at 16 bytes per voxel. In a Gaussian scene, the
+     * Gaussians in view must fit, at 352 bytes each. */
     TRIPTYCH_RENDERER_INTEGRAL,
 } triptych_renderer;
 
@@ -495,7 +496,8 @@ typedef enum triptych_field {
 typedef struct triptych_integral_settings {
     triptych_field field;
     /* Bound of the error of each component of a pixel, 1e-12 to 0.1. The default is 1e-3 for the
-     * mean over the area of each pixel, and 1e-4 for a number of rays per pixel. */
+     * mean over the area of each pixel, 1e-4 for a number of rays per pixel, and 5e-5 for a Gaussian
+     * scene. */
     double tolerance;
 } triptych_integral_settings;
 
@@ -581,6 +583,10 @@ typedef enum triptych_order {
     /* By their coordinates along X, Y and Z. The layers of the three lists are blended. Fewer
      * Gaussians change places when the view turns. */
     TRIPTYCH_ORDER_LISTS,
+    /* In slabs of space, perpendicular to X, Y and Z. A Gaussian shares out its optical depth over
+     * the sheets that it reaches. The order inside a sheet does not matter. The picture comes close
+     * to the integral of overlapping Gaussians. Not with GL. */
+    TRIPTYCH_ORDER_SHEETS,
 } triptych_order;
 
 /* The highest degree of the spherical harmonics of a scene that are read and drawn. */
@@ -596,6 +602,9 @@ typedef enum triptych_harmonics {
 typedef struct triptych_scene_settings {
     triptych_order order;
     triptych_harmonics harmonics;
+    /* Thickness of a sheet in units of the scene; for the order by sheets. The default is a 1024th
+     * of the scene's radius, half the diagonal of its typical bounds. */
+    double sheet;
 } triptych_scene_settings;
 
 /* The settings of a picture. NULL selects the defaults of a group. */

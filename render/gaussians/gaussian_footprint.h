@@ -135,19 +135,31 @@ static inline double trip_gaussian_opacity(const trip_gaussian *g, const trip_ga
     return opacity;
 }
 
-/* Sets the rows of J R diag(deviations). A limited J stays near the picture. */
-static inline void trip_gaussian_to_picture(const trip_camera *c, const trip_gaussian *g,
-                                            bool limited, const trip_gaussian_footprint *f,
-                                            trip_vec3 *a, trip_vec3 *b)
+/* Sets the rows of the Jacobian at a footprint's position and depth. */
+static inline void trip_gaussian_jacobian(const trip_camera *c, trip_gaussian_shape shape,
+                                          const trip_gaussian_footprint *f, trip_vec3 *jx,
+                                          trip_vec3 *jy)
 {
-    trip_vec3 jx = c->to_x, jy = c->to_y;
-    if (!c->ortho) {
-        const double w = 0.5 * c->width, h = 0.5 * c->height, clamp = TRIP_GAUSSIAN_CLAMP;
-        const double x = !limited ? f->x : fmin(w * (1 + clamp), fmax(w * (1 - clamp), f->x));
-        const double y = !limited ? f->y : fmin(h * (1 + clamp), fmax(h * (1 - clamp), f->y));
-        jx = trip_scale(trip_sub(jx, trip_scale(c->forward, x)), 1 / f->z);
-        jy = trip_scale(trip_sub(jy, trip_scale(c->forward, y)), 1 / f->z);
-    }
+    const bool limited = shape == TRIP_GAUSSIAN_PROJECTED;
+    *jx = c->to_x;
+    *jy = c->to_y;
+    if (c->ortho)
+        return;
+    const double w = 0.5 * c->width, h = 0.5 * c->height, clamp = TRIP_GAUSSIAN_CLAMP;
+    const double x = !limited ? f->x : fmin(w * (1 + clamp), fmax(w * (1 - clamp), f->x));
+    const double y = !limited ? f->y : fmin(h * (1 + clamp), fmax(h * (1 - clamp), f->y));
+    *jx = trip_scale(trip_sub(*jx, trip_scale(c->forward, x)), 1 / f->z);
+    *jy = trip_scale(trip_sub(*jy, trip_scale(c->forward, y)), 1 / f->z);
+}
+
+/* Sets the rows of J R diag(deviations). */
+static inline void trip_gaussian_to_picture(const trip_camera *c, const trip_gaussian *g,
+                                            trip_gaussian_shape shape,
+                                            const trip_gaussian_footprint *f, trip_vec3 *a,
+                                            trip_vec3 *b)
+{
+    trip_vec3 jx, jy;
+    trip_gaussian_jacobian(c, shape, f, &jx, &jy);
     const trip_vec3 deviations = trip_gaussian_deviations(g);
     *a = trip_vec3_times(trip_gaussian_to_axes(g, jx), deviations);
     *b = trip_vec3_times(trip_gaussian_to_axes(g, jy), deviations);
@@ -159,7 +171,7 @@ static inline bool trip_gaussian_project(const trip_camera *c, const trip_gaussi
                                          const trip_gaussian *g, trip_gaussian_footprint *f)
 {
     trip_vec3 a, b;
-    trip_gaussian_to_picture(c, g, s->shape == TRIP_GAUSSIAN_PROJECTED, f, &a, &b);
+    trip_gaussian_to_picture(c, g, s->shape, f, &a, &b);
     /* The determinant of a sum has no cancellation in this form. */
     const double xx = trip_dot(a, a), xy = trip_dot(a, b), yy = trip_dot(b, b);
     const double bare = trip_dot(trip_cross(a, b), trip_cross(a, b)), add = TRIP_GAUSSIAN_LOW_PASS;
@@ -212,7 +224,7 @@ static inline double trip_gaussian_compensation(const trip_camera *c, const trip
     trip_vec3 a, b;
     if (!(f.z > 0))
         return 1;
-    trip_gaussian_to_picture(c, g, true, &f, &a, &b);
+    trip_gaussian_to_picture(c, g, TRIP_GAUSSIAN_PROJECTED, &f, &a, &b);
     const trip_vec3 cross = trip_cross(a, b);
     const double bare = trip_dot(cross, cross);
     return sqrt(bare / (bare + add * (trip_dot(a, a) + trip_dot(b, b)) + add * add));

@@ -6,6 +6,9 @@
 
 #include "clock.h"
 #include "gaussian_footprint.h"
+#include "gaussian_integral.h"
+#include "gaussian_keys.h"
+#include "gaussian_sheet_frame.h"
 #include "gaussians_cpu.h"
 #include "gaussians_reference.h"
 #include "normalise.h"
@@ -32,6 +35,9 @@ typedef struct layer {
 
 struct trip_gaussian_frame {
     trip_gaussian_frame_params params;
+    /* Draw the frame if they are not NULL. */
+    trip_gaussian_integral *integral;
+    trip_gaussian_sheet_frame *sheets;
     trip_settings weights; /* of the order by lists */
     int axis_of_view;
     layer layers[LAYERS_MAX];
@@ -135,76 +141,6 @@ static int take_layer(const layer *l, float *rgba, float *depth)
 
 /* ---- streams ---- */
 
-static void put(double to[3], trip_vec3 v)
-{
-    to[0] = v.x;
-    to[1] = v.y;
-    to[2] = v.z;
-}
-
-static trip_gaussian_view view_of(const trip_camera *c)
-{
-    const trip_camera_params *p = &c->params;
-    const trip_vec3 forward = trip_normalize(trip_sub(p->look, p->eye));
-    const trip_vec3 right = trip_normalize(trip_cross(forward, p->up));
-    const double half = c->ortho ? p->ortho_height / 2 : tan(p->fov_degrees * (M_PI / 360));
-    trip_gaussian_view v = {
-        .parallel = c->ortho,
-        .half_width = half * c->width / c->height,
-        .half_height = half,
-        .width_px = (unsigned)c->width,
-        .height_px = (unsigned)c->height,
-    };
-    put(v.eye, p->eye);
-    put(v.right, right);
-    put(v.down, trip_cross(forward, right));
-    put(v.forward, forward);
-    return v;
-}
-
-/* Sets the planes of the view's sides, and the nearest plane that shows a centre. */
-static unsigned find_planes(const trip_camera *c, trip_gaussian_plane planes[])
-{
-    const trip_gaussian_view v = view_of(c);
-    trip_gaussian_view_planes(&v, planes);
-    trip_gaussian_plane *near = &planes[TRIP_GAUSSIAN_SIDES];
-    *near = (trip_gaussian_plane){ .offset = c->ortho ? 0 : -0.99 * TRIP_GAUSSIAN_NEAR };
-    for (int a = 0; a < 3; a++) {
-        near->normal[a] = v.forward[a];
-        near->offset -= v.forward[a] * v.eye[a];
-    }
-    return TRIP_GAUSSIAN_SIDES + 1;
-}
-
-/* The key of a list: the coordinate relative to the eye, in one direction. */
-static trip_gaussian_key key_of_list(const trip_camera *c, int axis, int way)
-{
-    trip_gaussian_key key = { .offset = -way * trip_component(c->eye, axis) };
-    key.direction[axis] = way;
-    return key;
-}
-
-static trip_gaussian_key key_of_depth(const trip_camera *c)
-{
-    trip_gaussian_key key = { .offset = -trip_dot(c->forward, c->eye) };
-    put(key.direction, c->forward);
-    return key;
-}
-
-/* A length covers the most pixels in the corners of the picture. */
-static trip_gaussian_lod lod_of(const trip_gaussian_frame *f)
-{
-    const trip_camera *c = f->params.camera;
-    const trip_gaussian_view v = view_of(c);
-    trip_gaussian_lod lod = { .voxel_px = f->params.lod_px,
-                              .eye = { v.eye[0], v.eye[1], v.eye[2] },
-                              .parallel = c->ortho,
-                              .px = c->height / (2 * v.half_height) };
-    if (!c->ortho)
-        lod.px *= sqrt(1 + v.half_width * v.half_width + v.half_height * v.half_height);
-    return lod;
-}
-
 static int open_stream(trip_gaussian_frame *f, const trip_gaussian_stream_params *params)
 {
     trip_gaussian_stream **out = &f->sources[f->source_count].stream;
@@ -232,24 +168,25 @@ static int open_streams(trip_gaussian_frame *f, const layer *l)
     trip_gaussian_stream_params p = {
         .axis = l->axis,
         .planes = planes,
-        .plane_count = find_planes(c, planes),
-        .lod = lod_of(f),
+        .plane_count = trip_gaussian_planes_of(c, planes),
+        .lod = trip_gaussian_lod_of(c, f->params.lod_px),
         .degree = f->params.settings.degree,
     };
     f->source_count = 0;
     f->planned = f->seen = 0;
     if (!f->params.by_lists) {
-        p.key = key_of_depth(c);
+        p.key = trip_gaussian_key_of_depth(c);
         return open_stream(f, &p);
     }
     if (c->ortho) {
-        p.key = key_of_list(c, l->axis, trip_ray_goes(c->r0, l->axis) == TRIP_WAY_UP ? 1 : -1);
+        p.key = trip_gaussian_key_of_list(c, l->axis,
+                                          trip_ray_goes(c->r0, l->axis) == TRIP_WAY_UP ? 1 : -1);
         return open_stream(f, &p);
     }
     p.key_max = DBL_MAX;
-    p.key = key_of_list(c, l->axis, 1);
+    p.key = trip_gaussian_key_of_list(c, l->axis, 1);
     int status = open_stream(f, &p);
-    p.key = key_of_list(c, l->axis, -1);
+    p.key = trip_gaussian_key_of_list(c, l->axis, -1);
     p.key_min = DBL_TRUE_MIN; /* a key of 0 is in the first stream */
     return status ? status : open_stream(f, &p);
 }
@@ -314,7 +251,82 @@ static int take_batch(trip_gaussian_frame *f, const trip_gaussian **batch, size_
     return status;
 }
 
+/* ---- the integral ---- */
+
+static int begin_integral(trip_gaussian_frame *f)
+{
+    const trip_gaussian_frame_params *p = &f->params;
+    return trip_gaussian_integral_begin(&f->integral, &(trip_gaussian_integral_params){
+                                                          .set = p->set,
+                                                          .camera = p->camera,
+                                                          .settings = p->settings,
+                                                          .tolerance = p->tolerance,
+                                                          .budget = p->budget,
+                                                          .runner = p->runner,
+                                                      });
+}
+
+static trip_gaussian_frame_stats stats_of_integral(const trip_gaussian_frame *f)
+{
+    const trip_gaussian_integral_stats s = trip_gaussian_integral_get_stats(f->integral);
+    return (trip_gaussian_frame_stats){
+        .gaussians = s.gaussians,
+        .bricks = s.bricks,
+        .bytes_read = s.bytes_read,
+        .window_records = s.window_records,
+        .draw_ms = s.draw_ms,
+        .read_ms = s.read_ms,
+        .merge_ms = f->stats.merge_ms,
+    };
+}
+
+/* ---- sheets ---- */
+
+static int begin_sheets(trip_gaussian_frame *f)
+{
+    const trip_gaussian_frame_params *p = &f->params;
+    return trip_gaussian_sheet_frame_begin(&f->sheets, &(trip_gaussian_sheet_frame_params){
+                                                           .set = p->set,
+                                                           .camera = p->camera,
+                                                           .settings = p->settings,
+                                                           .weights = &f->weights,
+                                                           .thickness = p->sheet,
+                                                           .reference = p->reference,
+                                                           .budget = p->budget,
+                                                           .runner = p->runner,
+                                                       });
+}
+
+static trip_gaussian_frame_stats stats_of_sheets(const trip_gaussian_frame *f)
+{
+    const trip_gaussian_sheet_frame_stats s = trip_gaussian_sheet_frame_get_stats(f->sheets);
+    return (trip_gaussian_frame_stats){
+        .gaussians = s.gaussians,
+        .bricks = s.bricks,
+        .bytes_read = s.bytes_read,
+        .window_records = s.held_records,
+        .layers = s.passes,
+        .draw_ms = s.draw_ms,
+        .read_ms = s.read_ms,
+        .merge_ms = f->stats.merge_ms,
+    };
+}
+
 /* ---- the frame ---- */
+
+static int begin_layers_and_streams(trip_gaussian_frame *f)
+{
+    int status = take_memory(f) ? 0
+                                : trip_fail(TRIP_ERROR, "render", "memory",
+                                            "the layers do not fit; raise --memory or draw a "
+                                            "smaller picture");
+    if (!status)
+        status = begin_layers(f);
+    if (!status)
+        status = open_streams(f, f->layers);
+    f->stats.layers = f->layer_count;
+    return status;
+}
 
 int trip_gaussian_frame_begin(trip_gaussian_frame **out, const trip_gaussian_frame_params *params)
 {
@@ -325,15 +337,9 @@ int trip_gaussian_frame_begin(trip_gaussian_frame **out, const trip_gaussian_fra
     f->axis_of_view = trip_weight_axis_of_view(params->camera);
     if (params->by_lists)
         f->weights = *params->by_lists;
-    int status = take_memory(f) ? 0
-                                : trip_fail(TRIP_ERROR, "render", "memory",
-                                            "the layers do not fit; raise --memory or draw a "
-                                            "smaller picture");
-    if (!status)
-        status = begin_layers(f);
-    if (!status)
-        status = open_streams(f, f->layers);
-    f->stats.layers = f->layer_count;
+    const int status = params->integral    ? begin_integral(f)
+                       : params->sheet > 0 ? begin_sheets(f)
+                                           : begin_layers_and_streams(f);
     if (!status)
         return 0;
     trip_gaussian_frame_end(f);
@@ -382,6 +388,10 @@ static int draw_batch(trip_gaussian_frame *f)
 int trip_gaussian_frame_step(trip_gaussian_frame *f, uint64_t deadline_ns)
 {
     int status = 0;
+    if (f->integral)
+        return trip_gaussian_integral_step(f->integral, deadline_ns);
+    if (f->sheets)
+        return trip_gaussian_sheet_frame_step(f->sheets, deadline_ns);
     while (!status && f->drawn < f->layer_count) {
         status = draw_batch(f);
         if (!status)
@@ -437,15 +447,20 @@ static int merge(trip_gaussian_frame *f, float *rgba, float *depth)
 int trip_gaussian_frame_picture(trip_gaussian_frame *f, float *rgba, float *depth)
 {
     const double begun = trip_now_ms();
-    const int status =
-        f->params.by_lists ? merge(f, rgba, depth) : take_layer(f->layers, rgba, depth);
+    int status = 0;
+    if (f->integral)
+        trip_gaussian_integral_picture(f->integral, rgba);
+    else if (f->sheets)
+        trip_gaussian_sheet_frame_picture(f->sheets, rgba, depth);
+    else
+        status = f->params.by_lists ? merge(f, rgba, depth) : take_layer(f->layers, rgba, depth);
     f->stats.merge_ms += trip_now_ms() - begun;
     return status;
 }
 
 trip_gaussian_frame_stats trip_gaussian_frame_get_stats(const trip_gaussian_frame *f)
 {
-    return f->stats;
+    return f->integral ? stats_of_integral(f) : f->sheets ? stats_of_sheets(f) : f->stats;
 }
 
 void trip_gaussian_frame_end(trip_gaussian_frame *f)
@@ -453,6 +468,8 @@ void trip_gaussian_frame_end(trip_gaussian_frame *f)
     if (!f)
         return;
     trip_budget *budget = f->params.budget;
+    trip_gaussian_integral_end(f->integral);
+    trip_gaussian_sheet_frame_end(f->sheets);
     close_streams(f);
     for (unsigned i = 0; i < f->layer_count; i++) {
         trip_gaussians_cpu_end(f->layers[i].cpu);

@@ -5,6 +5,8 @@
  * - The order by lists has a layer for each axis with weight in the picture. Its Gaussians come in
  *   the order of their coordinate along the axis, outwards from the eye. Layers are merged with
  *   w^2 (equation 3 of Hofsetz, Max & Bastos 2008; weight.h).
+ * - The order by sheets lets Gaussians overlap (gaussian_sheets.h).
+ * - The integral has neither order nor layers (gaussian_integral.h).
  *
  * A layer ends early once no pixel takes more. One thread; the runner lends others. */
 #ifndef TRIP_GAUSSIAN_FRAME_H
@@ -23,11 +25,15 @@ typedef struct trip_gaussian_frame_params {
     const trip_gaussian_set *set;
     const trip_camera *camera; /* index space is the scene's space */
     trip_gaussian_settings settings;
-    /* For the order by lists: its method and h. NULL: by depth. */
+    /* For the orders by lists and by sheets: their method and h. NULL: by depth. */
     const trip_settings *by_lists;
-    /* Width in pixels of the voxels that coarse Gaussians may stand for; 0: none do. */
+    double sheet; /* thickness of the sheets, in units of the scene; 0: not by sheets */
+    /* Width in pixels of the voxels that coarse Gaussians may stand for; 0: none do. Sheets and the
+     * integral have none. */
     double lod_px;
-    bool reference; /* draws in double precision, without threads */
+    bool reference;   /* draws in double precision, without threads */
+    bool integral;    /* has no order */
+    double tolerance; /* of the integral; 0 means the default */
     /* Composites in place of the CPU; NULL for none. It must outlive the frame. */
     const trip_tile_device *device;
     trip_budget *budget;
@@ -39,7 +45,7 @@ typedef struct trip_gaussian_frame_stats {
     uint64_t planned;   /* in the plans of the streams */
     uint64_t coarse;    /* in the plans, of coarse levels */
     uint64_t bricks, bytes_read;
-    uint64_t window_records; /* room in the largest window */
+    uint64_t window_records; /* room in the largest window, or Gaussians that meet a sheet */
     unsigned layers;
     double done; /* share of the frame, 0 to 1 */
     double draw_ms, read_ms, merge_ms;

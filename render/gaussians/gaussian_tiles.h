@@ -44,6 +44,27 @@ typedef struct trip_curve {
     float left, right, top, bottom;
 } trip_curve;
 
+/* A projected Gaussian with its density along rays (gaussian_profile.h), for drawing by sheets.
+ * Coordinates count along the axis of the sheets, in the direction of the rays. */
+typedef struct trip_sheet_splat {
+    trip_projected footprint;
+    trip_curve curve; /* if the footprint is curved */
+    float across, across_shear, down, slope_x, slope_y, variance, unit;
+    double coordinate;   /* of the centre */
+    int64_t first, last; /* sheets that it reaches */
+} trip_sheet_splat;
+
+enum { TRIP_SHEET_RUN = 16 }; /* sheets that are drawn at once */
+
+/* A run of sheets, perpendicular to an axis. */
+typedef struct trip_sheet_run {
+    int64_t first; /* number of the first sheet; sheet n begins at n * thickness */
+    double thickness;
+    double r0, rx, ry; /* the component along the axis of the ray of p is r0 + rx p.x + ry p.y */
+    double ox, oy;     /* so much the coordinate grows from pixel to pixel at a depth of 1 unit */
+    bool parallel;
+} trip_sheet_run;
+
 typedef struct trip_tile_kernels {
     const char *isa;
     /* Draws splats[list[0]] to splats[list[count - 1]] into the tile with its corner at pixel (x,
@@ -52,6 +73,11 @@ typedef struct trip_tile_kernels {
     void (*draw)(float *planes, uint16_t *open, const trip_projected *splats,
                  const trip_curve *curves, const uint32_t *list, size_t count, int x, int y,
                  float termination, bool depth);
+    /* Draws the splats that reach into a run, then composites its sheets front to back. Splats that
+     * are thicker than a sheet share out their optical depth. */
+    void (*draw_sheets)(float *planes, uint16_t *open, const trip_sheet_run *run,
+                        const trip_sheet_splat *splats, const uint32_t *list, size_t count, int x,
+                        int y, float termination, bool depth);
 } trip_tile_kernels;
 
 /* The lists of a piece. Tile t draws splats[pairs[first[t]]] and the count[t] - 1 next ones. */

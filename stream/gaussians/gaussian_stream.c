@@ -127,6 +127,14 @@ static bool is_behind(const trip_gaussian_plane *p, const trip_file_gaussian_bri
     return corner_key(&key, b, true) + p->reach * radius < 0;
 }
 
+/* Returns the keys of a brick's centres minus the keys of its splats. */
+static double lead_of(const trip_gaussian_stream_params *p, const trip_file_gaussian_brick *b)
+{
+    return p->reach > 0
+               ? p->reach * exp((double)b->log_hi) + fmax(0, corner_key(&p->spread, b, true))
+               : 0;
+}
+
 static bool has_keys(const trip_gaussian_stream_params *p)
 {
     return p->key_min != 0 || p->key_max != 0;
@@ -188,8 +196,10 @@ static void add_node(steps *s, step *found, trip_key *keys, const trip_gaussian_
     const uint64_t first = n->first_brick[p->axis];
     for (uint64_t i = first; i < first + n->brick_count[p->axis]; i++) {
         const trip_file_gaussian_brick *b = &set->lists[p->axis].bricks[i];
-        const step here = { corner_key(&p->key, b, false), corner_key(&p->key, b, true), i,
-                            (float)walk->share, n->nodes > 1 };
+        const double lead = lead_of(p, b);
+        const step here = { corner_key(&p->key, b, false) - lead,
+                            corner_key(&p->key, b, true) - lead, i, (float)walk->share,
+                            n->nodes > 1 };
         if (!is_wanted(p, b, &here))
             continue;
         keys[s->count] = (trip_key){ trip_key_of(here.lo), s->count };
@@ -270,6 +280,28 @@ static uint64_t window_of(const steps *s, const trip_gaussian_list *list)
     return most;
 }
 
+/* Returns the greatest number of splats that meet a plane while it makes a step. */
+static uint64_t held_of(const steps *s, const trip_gaussian_list *list,
+                        const trip_gaussian_stream_params *p)
+{
+    uint64_t held = 0, most = 0, gone = 0;
+    trip_key *leaving = (void *)(s->sorted + 2 * list->brick_count);
+    trip_key *scratch = leaving + list->brick_count;
+    for (uint64_t i = 0; i < s->count; i++) {
+        const double lead = lead_of(p, &list->bricks[s->sorted[i].brick]);
+        leaving[i] = (trip_key){ trip_key_of(s->sorted[i].hi + 2 * lead + p->hold), i };
+    }
+    trip_key_sort(leaving, scratch, s->count);
+    for (uint64_t i = 0; i < s->count; i++) {
+        const uint64_t lo = trip_key_of(s->sorted[i].lo);
+        for (; leaving[gone].key < lo; gone++)
+            held -= list->bricks[s->sorted[leaving[gone].number].brick].records;
+        held += list->bricks[s->sorted[i].brick].records;
+        most = held > most ? held : most;
+    }
+    return most;
+}
+
 /* Each step may have a chunk that is not full. */
 static uint64_t chunk_count(uint64_t bricks, uint64_t window)
 {
@@ -291,12 +323,15 @@ static uint64_t whole_pages(uint64_t bytes)
     return (bytes + 4095) / 4096 * 4096;
 }
 
-static trip_gaussian_plan plan_of(const steps *s, const trip_gaussian_set *set, int axis,
-                                  int degree)
+static trip_gaussian_plan plan_of(const steps *s, const trip_gaussian_set *set,
+                                  const trip_gaussian_stream_params *p)
 {
     const trip_file_gaussian_header *h = &set->header;
-    const trip_gaussian_list *list = &set->lists[axis];
-    trip_gaussian_plan plan = { .bricks = s->count, .window_records = window_of(s, list) };
+    const trip_gaussian_list *list = &set->lists[p->axis];
+    const int degree = degree_of(set, p);
+    trip_gaussian_plan plan = { .bricks = s->count,
+                                .window_records = window_of(s, list),
+                                .held_records = p->reach > 0 ? held_of(s, list, p) : 0 };
     for (uint64_t i = 0; i < s->count; i++) {
         const uint32_t records = list->bricks[s->sorted[i].brick].records;
         plan.records += records;
@@ -315,7 +350,7 @@ int trip_gaussian_stream_plan(const trip_gaussian_set *set,
     steps s;
     const int status = make_steps(&s, set, params, budget);
     if (status == TRIP_OK)
-        *plan = plan_of(&s, set, params->axis, degree_of(set, params));
+        *plan = plan_of(&s, set, params);
     free_steps(&s, budget);
     return status;
 }
@@ -404,7 +439,7 @@ int trip_gaussian_stream_open(trip_gaussian_stream **out, const trip_gaussian_se
     s->plane_count = trip_gaussian_plane_count(&set->header, s->degree);
     int status = make_steps(&s->steps, set, params, budget);
     if (status == TRIP_OK) {
-        s->plan = plan_of(&s->steps, set, params->axis, s->degree);
+        s->plan = plan_of(&s->steps, set, params);
         status = take_memory(s);
     }
     if (status < 0) {
@@ -481,6 +516,7 @@ static int read_step(trip_gaussian_stream *s, uint64_t i)
 {
     const uint64_t brick = s->steps.sorted[i].brick;
     const trip_file_gaussian_brick *b = &s->list->bricks[brick];
+    const double lead = lead_of(&s->params, b);
     int status = TRIP_OK;
     read_ahead(s, i + READ_AHEAD);
     for (unsigned n = 0; n < s->plane_count && status == TRIP_OK; n++)
@@ -489,7 +525,7 @@ static int read_step(trip_gaussian_stream *s, uint64_t i)
         double centre[3];
         trip_gaussian_decode_centre(b, s->planes[0] + (size_t)j * TRIP_GAUSSIAN_RECORD_BYTES,
                                     centre);
-        const double key = trip_gaussian_key_of(&s->params.key, centre);
+        const double key = trip_gaussian_key_of(&s->params.key, centre) - lead;
         if (!has_keys(&s->params) || (key >= s->params.key_min && key <= s->params.key_max))
             put(s, i, j, key);
     }

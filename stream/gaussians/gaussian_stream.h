@@ -46,6 +46,12 @@ typedef struct trip_gaussian_stream_params {
     trip_gaussian_key key;
     /* Splats with other keys are left out. Both 0 means all keys. */
     double key_min, key_max;
+    /* Keys are less by `reach` times the largest deviation of the brick, plus the greatest value of
+     * `spread` in the brick. So splats come in the order in which a plane meets them. Only for keys
+     * with a direction of unit length. trip_gaussian_plan.held_records counts for a plane that
+     * makes steps of the length `hold`. */
+    double reach, hold;
+    trip_gaussian_key spread;
     const trip_gaussian_plane *planes; /* at most TRIP_GAUSSIAN_PLANES_MAX */
     unsigned plane_count;
     trip_gaussian_lod lod;
@@ -89,8 +95,10 @@ typedef struct trip_gaussian_plan {
     uint64_t bricks, records; /* that will be read */
     uint64_t coarse_records;  /* of these */
     uint64_t window_records;  /* greatest number of splats in the window */
-    uint64_t bytes;           /* of memory that the stream takes from its budget */
-    uint64_t read_bytes;      /* from the disk */
+    /* With `reach`: greatest number of splats that meet the plane during a step. */
+    uint64_t held_records;
+    uint64_t bytes;      /* of memory that the stream takes from its budget */
+    uint64_t read_bytes; /* from the disk */
 } trip_gaussian_plan;
 
 /* Sets *plan. Takes 96 bytes a brick from the budget meanwhile. */

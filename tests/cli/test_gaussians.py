@@ -360,6 +360,159 @@ class Gaussians(program.ProgramTest):
             jumps.append(max(255 * numpy.abs(a - b).mean() for a, b in zip(frames, frames[1:])))
         self.assertLess(jumps[1], 2 * jumps[0])
 
+    # ---- overlapping Gaussians ----
+
+    OVERLAPPING = ("--renderer", "integral"), ("--order", "sheets"), \
+        ("--order", "sheets", "--renderer", "reference")
+
+    def test_overlapping_orders_draw_one_gaussian_as_depth_does(self):
+        data = self.scene("one", [row((0, 0, 0), (0.9, 0.4, 0.1), 0.8, (0.3, 0.1, 0.2))])
+        for view in view_of((1, -0.8, 3)), view_of((1, -0.8, 3), ortho_height=2), view_of((0.2, 0, 0.4)):
+            depth = self.picture(data, *options_of(view))
+            self.assertGreater(depth[:, :, 3].max(), 0.7)
+            for options in self.OVERLAPPING:
+                other = self.picture(data, *options_of(view), *options)
+                self.assertLess(255 * numpy.abs(depth - other).max(), 0.02, options)
+
+    def test_gaussians_apart_lie_over_one_another(self):
+        data = self.scene("apart", [row((0, 0, 0), (1, 0, 0), 0.6, (0.1, 0.1, 0.1)),
+                                    row((0, 0, 1), (0, 1, 0), 0.6, (0.1, 0.1, 1e-12))])
+        view = view_of((0, 0, 4), size=(33, 33), up=(0, 1, 0))
+        for options in self.OVERLAPPING:
+            picture = self.picture(data, *options_of(view), *options)
+            numpy.testing.assert_allclose(picture[16, 16], [0.24, 0.6, 0, 0.84], atol=2e-3, err_msg=str(options))
+
+    def test_equal_gaussians_mix_by_their_optical_depths(self):
+        a = -math.log(1 - 0.7), -math.log(1 - 0.4)
+        total, share = 1 - 0.3 * 0.6, a[0] / sum(a)
+        for thickness in 0.1, 1e-12:
+            deviations = 0.1, 0.1, thickness
+            data = self.scene("equal", [row((0, 0, 0), (1, 0, 0), 0.7, deviations),
+                                        row((0, 0, 0), (0, 1, 0), 0.4, deviations)])
+            view = view_of((0, 0, 2), size=(33, 33), up=(0, 1, 0))
+            for options in self.OVERLAPPING:
+                picture = self.picture(data, *options_of(view), *options)
+                numpy.testing.assert_allclose(picture[16, 16], [share * total, (1 - share) * total, 0, total],
+                                              atol=2e-3, err_msg=str(options))
+
+    def test_the_integral_is_a_fine_quadrature(self):
+        """The data set rounds its numbers, and the bounds are those of the other orders."""
+        rows = numpy.array(many(60))
+        rows[:, 7:10] += 1.5
+        data = self.scene("quadrature", rows)
+        scene = definition.read_ply("quadrature.ply")
+        for view in view_of((1.5, -1, 3), size=(18, 12)), view_of((0.2, 0.1, 0.3), size=(12, 8)), \
+                view_of((1.5, -1, 3), size=(18, 12), ortho_height=2.5):
+            expected = definition.overlap(scene, view)
+            self.assertGreater(expected[:, :, 3].mean(), 0.1)
+            ordered = definition.draw(scene, view)
+            apart = 255 * numpy.abs(self.picture(data, *options_of(view), "--renderer", "integral") - expected)
+            self.assertLess(apart.mean(), MEAN, view)
+            self.assertLess(apart.max(), MOST, view)
+            self.assertGreater(255 * numpy.abs(ordered - expected).mean(), 5 * apart.mean(), view)
+
+    def test_thin_sheets_come_close_to_the_integral(self):
+        """Halving the thickness divides the error by 2 at least. From inside, footprints that are
+        limited at the border of the picture keep a difference."""
+        rows = numpy.array(many(2000))
+        rows[:, 7:10] += 0.7
+        data = self.scene("thin", rows)
+        inside = view_of((0.1, 0.2, 0.1), (1, 0.1, 0.4), fov=110)
+        for view in view_of((1.5, -1, 3)), view_of((1.5, -1, 3), ortho_height=2.5), inside:
+            truth = self.picture(data, *options_of(view), "--renderer", "integral")
+            errors = [255 * numpy.abs(truth - self.picture(
+                data, *options_of(view), "--order", "sheets", *thickness)).mean()
+                for thickness in (("--sheet", 0.2), ("--sheet", 0.1), ("--sheet", 0.05), ())]
+            self.assertGreater(errors[0], 0.4)
+            for coarse, fine in zip(errors, errors[1:]):
+                self.assertLess(fine, coarse / (1 if view is inside else 2), errors)
+            self.assertLess(errors[-1], 0.25 if view is inside else 0.05)
+
+    def test_cpu_and_reference_draw_the_same_sheets(self):
+        data = self.scene("sheets", many(1500, degree=1), 1)
+        for more in (), ("--kernel", "exact"), ("--kernel", "ewa"), ("--h", "0"), ("--method", "axis"):
+            one, two = (self.picture(data, *options_of(view_of((1.5, -1, 3))), "--order", "sheets", "--sheet",
+                                     "0.01", *more, "--renderer", renderer) for renderer in ("cpu", "reference"))
+            self.assertGreater(one[:, :, 3].mean(), 0.05)
+            self.assertLess(255 * numpy.abs(one - two).max(), 0.1, more)
+
+    def test_sheets_have_the_same_bits_in_every_run(self):
+        data = self.scene("sheet-bits", many(20000, spread=3))
+        options = [data, "--size", "150x130", "--order", "sheets", "--sheet", "0.02"]
+        first = self.picture(*options)
+        for more in ("--threads", "1"), ("--threads", "5"), ("--memory", "40M"):
+            self.assertTrue((first == self.picture(*options, *more)).all(), more)
+        integral = [self.picture(data, "--size", "60", "--renderer", "integral", "--threads", n) for n in (1, 5)]
+        self.assertTrue((integral[0] == integral[1]).all())
+        widest = os.environ.get("TRIPTYCH_ISA")
+        try:
+            for isa in "plain", "avx2", "avx512":
+                os.environ["TRIPTYCH_ISA"] = isa
+                run = program.call("render", *options, "-o", "isa.exr", program=program.QUICK_PROGRAM)
+                if run.returncode == 0:
+                    self.assertTrue((first == program.read_exr("isa.exr")).all(), isa)
+                else:
+                    self.assertNotEqual(isa, "plain")
+        finally:
+            os.environ.pop("TRIPTYCH_ISA")
+            if widest:
+                os.environ["TRIPTYCH_ISA"] = widest
+
+    def test_sheets_and_the_integral_refuse_a_scene_that_does_not_fit(self):
+        data = self.scene("wide", many(100000))
+        for options in self.OVERLAPPING[:2]:
+            self.leaves_nothing(1, "render", data, "--size", "64", "-o", "a.png", "--memory", "12M",
+                                *options, says="raise --memory")
+
+    def test_the_distance_by_sheets_is_the_one_of_the_gaussians(self):
+        data = self.scene("distance", [row((0, 0, 0), opacity=0.9, deviations=(0.3, 0.3, 0.01))])
+        for renderer in "cpu", "reference":
+            self.works("render", data, *options_of(view_of((0, 0, 4), size=(9, 9), fov=2)), "--order", "sheets",
+                       "--renderer", renderer, "-o", "a.exr", "--depth", "d.exr", program=program.QUICK_PROGRAM)
+            names, z = program.read_exr_channels("d.exr")
+            self.assertEqual(names, [b"Z"])
+            self.assertAlmostEqual(float(z[4, 4, 0]), 4, delta=1e-3)
+
+    # ---- measuring ----
+
+    def test_bench_times_the_orders_and_a_sort(self):
+        data = self.scene("bench", many(20000))
+        report = json.loads(self.works("bench", "orders", data, "--size", "64", "--repeat", "1", "--json").stdout)
+        orders = {row["order"]: row for row in report["tables"]["orders"]["rows"]}
+        self.assertEqual(list(orders), ["depth", "lists", "sheets", "integral"])
+        for name, row in orders.items():
+            self.assertGreater(row["ms"], 0)
+            self.assertGreaterEqual(row["bytes_read"], 24 * row["gaussians"], name)
+        self.assertEqual(orders["depth"]["gaussians"], 20000)
+        rows = report["tables"]["sort"]["rows"]
+        self.assertEqual(rows[-1]["gaussians"], 20000)
+        self.assertEqual({row["same"] for row in rows}, {"yes"})
+
+    def test_accuracy_compares_the_orders(self):
+        """Two Gaussians at one place have a closed form in each order; the first one of equals is in front."""
+        rows = [row((0, 0, 0), (1, 0, 0), 0.5), row((0, 0, 0), (0, 1, 0), 0.5)]
+        data = self.scene("pair", rows)
+        shutil.rmtree("pair.accuracy", ignore_errors=True)
+        run = self.works("accuracy", data, "--size", "32", "--views", "2", "--repeat", "1")
+        self.assertIn("sheets, integral", run.stdout.decode())
+        with open("pair.accuracy/accuracy.json") as file:
+            report = json.load(file)
+        pairs = {r["pair"]: r for r in report["differences"]}
+        self.assertEqual(len(pairs), 6)
+        # At the centre: red 0.5 and green 0.25 over one another, 0.375 each as a mixture.
+        for pair in "depth, sheets", "depth, integral", "lists, sheets", "lists, integral":
+            self.assertAlmostEqual(pairs[pair]["max"], 255 * 0.125, delta=2, msg=pair)
+        for pair in "depth, lists", "sheets, integral":
+            self.assertLess(pairs[pair]["max"], 0.05, pair)
+        self.assertTrue(all(r["ms"] > 0 for r in report["orders"]))
+        with open("pair.accuracy/index.html") as file:
+            self.assertEqual(file.read().count("<img"), 4 + 6)
+        with open("pair.accuracy/accuracy.csv") as file:
+            self.assertEqual(len(file.read().split()), 5 + 6 + 7)
+        for options in ("--source", "a.nrrd"), ("--steps",), ("--settings", "all"), ("--tolerance", "1e-3"), \
+                       ("--budget", "3"), ("--compare", "none"), ("--no-shading",), ("--tf", "bone"):
+            self.leaves_nothing(2, "accuracy", data, "-o", "r", *options, says="does not apply to Gaussian scenes")
+
     # ---- runs ----
 
     def test_threads_and_memory_change_no_bit(self):
@@ -500,10 +653,12 @@ class Gaussians(program.ProgramTest):
 
     def test_commands_for_volumes_refuse_scenes(self):
         data = self.scene("refused", [row((0, 0, 0))])
-        for name in data, "refused.ply":
-            for command in ("accuracy", name, "-o", "r"), ("bench", "stream", name):
-                self.leaves_nothing(2, *command,
-                                    says=f"{name}: is a Gaussian scene; `triptych render` draws it")
+        self.leaves_nothing(2, "bench", "stream", data, says="only the tables orders and flight measure it")
+        self.leaves_nothing(2, "bench", "orders", data, "--tf", "bone", says="is a Gaussian scene")
+        self.leaves_nothing(2, "bench", "orders", data, "--no-shading", says="is a Gaussian scene")
+        self.leaves_nothing(2, "bench", "orders", data, "--renderer", "reference", says="must be cpu")
+        for command in "bench orders", "accuracy":
+            self.leaves_nothing(2, *command.split(), "refused.ply", says="`triptych brick` makes a data set of it")
         self.fails(2, "render", data, data, "-o", "a.png", says="give one scene at a time")
         self.fails(2, "tf", "show", data, says="is a Gaussian scene")
         self.leaves_nothing(2, "brick", data, "-o", "b.trip", says="is a data set already")
@@ -512,7 +667,14 @@ class Gaussians(program.ProgramTest):
         data = self.scene("settings", [row((0, 0, 0))])
         for options in ("--max-bytes", "1M"), ("--interpolation", "cubic"), ("--compositing", "sheet"), \
                        ("--error", "1"), ("--kernel", "fixed"), ("--tf", "bone"), \
-                       ("--effects", "shadows"), ("--renderer", "integral"):
+                       ("--effects", "shadows"), ("--sheet", "0.1"), ("--order", "sheets", "--lod", "1"), \
+                       ("--order", "lists", "--sheet", "0.1"), ("--sheet", "0", "--order", "sheets"), \
+                       ("--sheet", "1e-8", "--order", "sheets"), \
+                       ("--renderer", "gl", "--order", "sheets"), \
+                       ("--renderer", "integral", "--order", "sheets"), \
+                       ("--renderer", "integral", "--depth", "d.exr"), \
+                       ("--renderer", "integral", "--kernel", "exact"), ("--tolerance", "1e-3"), \
+                       ("--renderer", "integral", "--field", "splats"):
             self.leaves_nothing(2, "render", data, "-o", "a.png", *options)
         tooth = os.path.join(program.DATASETS, "tooth.nhdr")
         self.leaves_nothing(2, "brick", tooth, "-o", "b.trip", "--harmonics", "whole",

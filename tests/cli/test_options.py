@@ -123,6 +123,7 @@ RENDER = {
     "--low-pass-width": NUMBERS + ["-1", "17", "none"],
     "--weights": NAMES,
     "--order": NAMES,
+    "--sheet": NUMBERS + ["0", "-1", "1e13"],
     "--sh": NUMBERS + ["-1", "4", "1.5"],
     "--normalise": None,
     "--flatten": NUMBERS + ["0", "0.5", "1e9"],
