@@ -12,6 +12,7 @@
 #include "flight.h"
 #include "library.h"
 #include "piped_tf.h"
+#include "placed_input.h"
 #include "render_files.h"
 #include "render_options.h"
 #include "render_stats.h"
@@ -28,6 +29,7 @@ typedef struct drawing {
     render_options o;
     piped_tf function;
     cached_volume volume; /* if the input is a volume */
+    placed_input placed;  /* if the input is a scene file */
     char *choices_folder;
     triptych *t;
     float *rgba, *depth; /* depth is NULL without --depth */
@@ -96,7 +98,7 @@ static int open_data(drawing *d, const char *path)
     triptych_resources resources = o->resources;
     resources.keep_pages = d->sequence.frames > 1;
     resources.name = o->input;
-    int status = triptych_open(d->t, path, &resources);
+    int status = placed_input_open(&d->placed, d->t, path, &resources);
     return status ? status : library_add(d->t, o->more, o->more_count, o->heat);
 }
 
@@ -126,12 +128,27 @@ static int open_volume(drawing *d)
 static int check_input(const drawing *d)
 {
     const render_options *o = &d->o;
-    const bool is_scene = triptych_is_gaussians(d->t, o->input) != 0;
+    const bool is_scene = library_is_scene(d->t, o->input);
     int status = draw_settings_check_kind(&o->settings, is_scene);
     if (!status && is_scene && o->more_count)
-        status = trip_option_fail(o->input, "is a Gaussian scene; give one scene at a time");
+        status = trip_option_fail(o->input,
+                                  "is a Gaussian scene; a scene file draws several in one picture");
     if (!status && is_scene && o->quality.error > 0)
         status = library_fail_scene_option("error");
+    return status;
+}
+
+/* Finds or makes the data sets of a scene file. */
+static int find_objects(drawing *d)
+{
+    const cached_wish wish = wish_of(d);
+    int status = placed_input_read(&d->placed, d->t, d->o.input, &wish.options);
+    trip_progress_end(&d->progress);
+    if (!status && d->placed.bricked && !has_no_summary(&d->o)) {
+        trip_text_write(stdout, d->o.input);
+        printf(": %u of its %u objects bricked into the cache in %.2f s\n", d->placed.bricked,
+               d->placed.count, d->placed.seconds);
+    }
     return status;
 }
 
@@ -140,6 +157,12 @@ static int open_input(drawing *d)
     const int checked = check_input(d);
     if (checked)
         return checked;
+    if (triptych_is_scene_file(d->o.input)) {
+        int found = find_objects(d);
+        if (!found)
+            found = open_data(d, d->o.input);
+        return found ? found : triptych_set_transfer_function(d->t, &d->o.function);
+    }
     if (cached_volume_wanted(d->o.input))
         return open_volume(d);
     int status = open_data(d, d->o.input);
@@ -194,6 +217,7 @@ static void close_drawing(drawing *d)
         triptych_close(d->t); /* frees rgba and depth too */
     }
     cached_volume_close(&d->volume);
+    placed_input_close(&d->placed);
     free(d->choices_folder);
 }
 
@@ -357,6 +381,7 @@ static int draw_in_flight(drawing *d, int *first)
     const flight f = { .o = &d->o,
                        .sequence = &d->sequence,
                        .data = data_path(d),
+                       .placed = &d->placed,
                        .contexts = contexts_of(d),
                        .write = write_image,
                        .then = finish_image,

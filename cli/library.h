@@ -23,7 +23,9 @@ int library_check_heat(triptych *t, const char *heat, const triptych_resources *
 int library_fail_scene_option(const char *name);
 /* Fails if options for reading a volume were given for a Gaussian scene. */
 int library_check_scene_options(const triptych_brick_options *options);
-/* Fails: a command that needs volumes got a Gaussian scene. */
+/* Whether an input is a Gaussian scene, or a scene file. */
+bool library_is_scene(triptych *t, const char *input);
+/* Fails: a command that needs volumes got such an input. */
 int library_fail_scene(const char *input);
 
 void library_hush(triptych *t, bool quiet);

@@ -108,6 +108,11 @@ static int add_input(void *user, char *path)
 static int check_more(const render_options *o)
 {
     for (int i = 0; i < o->more_count; i++) {
+        const char *scene = triptych_is_scene_file(o->input)     ? o->input
+                            : triptych_is_scene_file(o->more[i]) ? o->more[i]
+                                                                 : NULL;
+        if (scene)
+            return trip_option_fail(scene, "is a scene file; list the other data sets in it too");
         const char *volume = cached_volume_wanted(o->input)     ? o->input
                              : cached_volume_wanted(o->more[i]) ? o->more[i]
                                                                 : NULL;

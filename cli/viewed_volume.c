@@ -66,7 +66,7 @@ static int check_volume(const viewed_volume *s, triptych *t, const char *volume)
 int viewed_volume_check(const viewed_volume *s, triptych *t, const char *input,
                         const triptych_resources *resources)
 {
-    if (triptych_is_gaussians(t, input))
+    if (library_is_scene(t, input))
         return library_fail_scene(input);
     if (cached_volume_wanted(input))
         return check_volume(s, t, input);

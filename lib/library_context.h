@@ -45,8 +45,11 @@ struct triptych {
 
     triptych_resources resources;
     char *name;
-    session session;                         /* of a scene: the budget and the name alone */
-    struct trip_gaussian_set *scene;         /* NULL: the data set is a volume */
+    session session;                 /* of a scene: the budget and the name alone */
+    struct trip_gaussian_set *scene; /* the first one; NULL: the data set is a volume */
+    struct trip_placed_set *placed;  /* all scenes of the picture */
+    unsigned placed_count;
+    uint64_t *placed_drawn;                  /* Gaussians of each, in the begun frame */
     struct trip_gaussian_frame *scene_frame; /* the begun frame of a scene */
     trip_renderer *device_renderer;          /* composites the scene (gl); NULL: `renderer` does */
     double scene_opacity;                    /* factor of the optical depth; 0 means 1 */
@@ -184,8 +187,10 @@ void trip_context_drop_stats(triptych *t);
 /* Gaussian scenes (library_scene.c): like the functions for volumes, inside the context's scope. */
 /* Finds the files of a volume or of a Gaussian scene. */
 int trip_context_find_files(trip_source *s, const char *path, const trip_volume_params *params);
-int trip_context_open_scene(triptych *t, const char *path, uint64_t memory_bytes);
+int trip_context_open_scenes(triptych *t, const triptych_object *objects, unsigned count,
+                             uint64_t memory_bytes);
 void trip_context_close_scene(triptych *t);
+int trip_context_verify_scenes(const triptych *t);
 /* Fails with TRIP_USAGE (reported) unless a volume is open. */
 int trip_context_check_volume(const triptych *t);
 trip_view_object trip_context_scene_object(const triptych *t);

@@ -1,5 +1,6 @@
 /* Gaussian scenes: opening, views and frames (triptych.h). */
 #include <float.h>
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -10,20 +11,96 @@
 #include "gaussian_set.h"
 #include "library_context.h"
 #include "normalise.h"
+#include "placed_stream.h"
 #include "report.h"
+#include "scene_file.h"
 
-int trip_context_open_scene(triptych *t, const char *path, uint64_t memory_bytes)
+static const char *name_of(const triptych_object *o)
+{
+    return o->name ? o->name : o->path;
+}
+
+/* Opens the set of object `i`, unless an earlier object has the same path. */
+static int open_set(triptych *t, const triptych_object *objects, unsigned i)
+{
+    trip_gaussian_set *set = NULL;
+    int status = 0;
+    for (unsigned k = 0; k < i && !t->placed[i].set; k++)
+        if (!strcmp(objects[k].path, objects[i].path))
+            t->placed[i].set = t->placed[k].set;
+    if (!t->placed[i].set) {
+        status = trip_gaussian_set_open(&set, objects[i].path, t->session.budget);
+        t->placed[i].set = status ? NULL : set;
+    }
+    if (i == 0)
+        t->scene = set;
+    return status;
+}
+
+static int place_set(trip_placed_set *p, const triptych_object *o)
+{
+    return trip_gaussian_transform_make(&p->placement, o->matrix) && p->placement.even
+               ? 0
+               : trip_fail(TRIP_USAGE, "render", name_of(o),
+                           "is a Gaussian scene: its matrix must move, turn and scale it evenly, "
+                           "without mirroring");
+}
+
+int trip_context_open_scenes(triptych *t, const triptych_object *objects, unsigned count,
+                             uint64_t memory_bytes)
 {
     t->session = (session){ .input = t->name };
     int status = trip_budget_create(&t->session.budget, memory_bytes);
-    return status ? status : trip_gaussian_set_open(&t->scene, path, t->session.budget);
+    t->placed = status ? NULL : calloc(count, sizeof *t->placed);
+    t->placed_drawn = status ? NULL : calloc(count, sizeof *t->placed_drawn);
+    if (!status && (!t->placed || !t->placed_drawn))
+        status = trip_fail(TRIP_ERROR, "render", t->name, "out of memory");
+    for (unsigned i = 0; i < count && !status; i++) {
+        t->placed_count = i + 1;
+        status = place_set(&t->placed[i], &objects[i]);
+        if (!status)
+            status = open_set(t, objects, i);
+    }
+    return status;
+}
+
+/* Whether an earlier object has the same set. */
+static bool is_shared(const triptych *t, unsigned i)
+{
+    bool shared = false;
+    for (unsigned k = 0; k < i; k++)
+        shared |= t->placed[k].set == t->placed[i].set;
+    return shared;
 }
 
 void trip_context_close_scene(triptych *t)
 {
     trip_context_end_scene(t);
-    trip_gaussian_set_close(t->scene);
+    for (unsigned i = t->placed_count; i > 0; i--)
+        if (t->placed[i - 1].set && !is_shared(t, i - 1))
+            trip_gaussian_set_close(t->placed[i - 1].set);
+    free(t->placed);
+    free(t->placed_drawn);
+    t->placed = NULL;
+    t->placed_drawn = NULL;
+    t->placed_count = 0;
     t->scene = NULL;
+}
+
+int trip_context_verify_scenes(const triptych *t)
+{
+    int status = 0;
+    for (unsigned i = 0; i < t->placed_count && !status; i++)
+        if (!is_shared(t, i))
+            status = trip_gaussian_set_verify(t->placed[i].set, t->session.budget);
+    return status;
+}
+
+unsigned triptych_get_objects(const triptych *t, const uint64_t **drawn)
+{
+    if (drawn)
+        *drawn = t->placed_drawn;
+    return t->placed_count;
 }
 
 int trip_context_check_volume(const triptych *t)
@@ -32,6 +109,44 @@ int trip_context_check_volume(const triptych *t)
     return !status && t->scene ? trip_fail(TRIP_USAGE, "render", t->name,
                                            "is a Gaussian scene; this applies to volumes only")
                                : status;
+}
+
+/* Adds the corners of a placed box to bounds. */
+static void add_box(const trip_gaussian_transform *t, const double from_lo[3],
+                    const double from_hi[3], double lo[3], double hi[3])
+{
+    for (int i = 0; i < 8; i++)
+        for (int a = 0; a < 3; a++) {
+            double at = t->m[a][3];
+            for (int k = 0; k < 3; k++)
+                at += t->m[a][k] * (i >> k & 1 ? from_hi[k] : from_lo[k]);
+            if (t->identity) /* exact */
+                at = i >> a & 1 ? from_hi[a] : from_lo[a];
+            lo[a] = fmin(lo[a], at);
+            hi[a] = fmax(hi[a], at);
+        }
+}
+
+/* Adds a scene to the description of all. */
+static void add_to_scene(const triptych *t, unsigned i, triptych_scene *out)
+{
+    const trip_placed_set *p = &t->placed[i];
+    const trip_file_gaussian_header *h = &p->set->header;
+    for (int a = 0; a < 3 && !i; a++) {
+        out->lo[a] = out->typical_lo[a] = INFINITY;
+        out->hi[a] = out->typical_hi[a] = -INFINITY;
+    }
+    add_box(&p->placement, h->centre_lo, h->centre_hi, out->lo, out->hi);
+    add_box(&p->placement, h->typical_lo, h->typical_hi, out->typical_lo, out->typical_hi);
+    out->gaussians += h->records;
+    out->degree = (int)h->degree > out->degree ? (int)h->degree : out->degree;
+    out->antialiased &= (h->flags & TRIP_GAUSSIAN_ANTIALIASED) != 0;
+    out->flat &= (h->flags & TRIP_GAUSSIAN_FLAT) != 0;
+    if (is_shared(t, i))
+        return;
+    out->bytes += p->set->bytes;
+    for (int a = 0; a < 3; a++)
+        out->bricks += h->brick_count[a];
 }
 
 int triptych_get_scene(triptych *t, triptych_scene *out)
@@ -43,23 +158,10 @@ int triptych_get_scene(triptych *t, triptych_scene *out)
         status = trip_fail(TRIP_USAGE, "render", t->name, "is not a Gaussian scene");
     if (status)
         return trip_context_leave(before, status);
-    const trip_file_gaussian_header *h = &t->scene->header;
-    *out = (triptych_scene){
-        .gaussians = h->records,
-        .degree = (int)h->degree,
-        .antialiased = h->flags & TRIP_GAUSSIAN_ANTIALIASED,
-        .flat = (h->flags & TRIP_GAUSSIAN_FLAT) != 0,
-        .y_down = (h->flags & TRIP_GAUSSIAN_Y_DOWN) != 0,
-        .bytes = t->scene->bytes,
-        .notes = t->scene->text,
-    };
-    for (int a = 0; a < 3; a++) {
-        out->lo[a] = h->centre_lo[a];
-        out->hi[a] = h->centre_hi[a];
-        out->typical_lo[a] = h->typical_lo[a];
-        out->typical_hi[a] = h->typical_hi[a];
-        out->bricks += h->brick_count[a];
-    }
+    *out = (triptych_scene){ .antialiased = 1, .flat = 1, .notes = t->scene->text };
+    out->y_down = (t->scene->header.flags & TRIP_GAUSSIAN_Y_DOWN) != 0;
+    for (unsigned i = 0; i < t->placed_count; i++)
+        add_to_scene(t, i, out);
     return trip_context_leave(before, 0);
 }
 
@@ -77,12 +179,16 @@ trip_view_object trip_context_scene_object(const triptych *t)
     const bool y_down = h->flags & TRIP_GAUSSIAN_Y_DOWN;
     o.up = y_down ? trip_v3(0, -1, 0) : trip_v3(0, 1, 0);
     o.front = y_down ? trip_v3(0, 0, -1) : trip_v3(0, 0, 1);
-    bool point = true;
-    for (int a = 0; a < 3; a++)
-        point &= h->typical_lo[a] >= h->typical_hi[a];
+    bool point = t->placed_count == 1;
     for (int a = 0; a < 3; a++) {
-        o.lo[a] = point ? h->reach_lo[a] : h->typical_lo[a];
-        o.hi[a] = point ? h->reach_hi[a] : h->typical_hi[a];
+        point &= h->typical_lo[a] >= h->typical_hi[a];
+        o.lo[a] = INFINITY;
+        o.hi[a] = -INFINITY;
+    }
+    for (unsigned i = 0; i < t->placed_count; i++) {
+        const trip_file_gaussian_header *of = &t->placed[i].set->header;
+        add_box(&t->placed[i].placement, point ? of->reach_lo : of->typical_lo,
+                point ? of->reach_hi : of->typical_hi, o.lo, o.hi);
     }
     return o;
 }
@@ -119,12 +225,23 @@ static trip_gaussian_shape shape_of(triptych_footprint footprint)
                                                  : TRIP_GAUSSIAN_PROJECTED;
 }
 
+/* Returns the highest degree of the scenes. */
+static int degree_of(const triptych *t)
+{
+    int degree = 0;
+    for (unsigned i = 0; i < t->placed_count; i++) {
+        const int own = (int)t->placed[i].set->header.degree;
+        degree = own > degree ? own : degree;
+    }
+    return degree;
+}
+
 static trip_gaussian_settings settings_of(const triptych *t)
 {
     const draw_settings *g = &t->given;
     trip_gaussian_settings out = {
         .degree = g->scene.harmonics ? (int)g->scene.harmonics - 1 : TRIP_SH_DEGREE_MAX,
-        .antialiased = t->scene->header.flags & TRIP_GAUSSIAN_ANTIALIASED,
+        .antialiased = true,
         .shape = shape_of(g->splat.footprint),
         .opacity_scale = t->scene_opacity,
         .early_termination = g->all.early_termination == TRIPTYCH_ZERO ? DBL_MIN /* never */
@@ -132,8 +249,10 @@ static trip_gaussian_settings settings_of(const triptych *t)
         .clip = trip_context_clip(t),
         .depth = g->all.depth,
     };
-    if (out.degree > (int)t->scene->header.degree)
-        out.degree = (int)t->scene->header.degree;
+    for (unsigned i = 0; i < t->placed_count; i++)
+        out.antialiased &= (t->placed[i].set->header.flags & TRIP_GAUSSIAN_ANTIALIASED) != 0;
+    if (out.degree > degree_of(t))
+        out.degree = degree_of(t);
     memcpy(out.background, t->settings.background, sizeof out.background);
     return out;
 }
@@ -197,8 +316,11 @@ int trip_context_begin_scene(triptych *t)
     t->drawn_settings.classify = TRIP_CLASSIFY_PRE; /* h of splats */
     t->drawn_settings.samples = side;
     t->begun_ms = trip_now_ms();
+    memset(t->placed_drawn, 0, t->placed_count * sizeof *t->placed_drawn);
     const trip_gaussian_frame_params params = {
-        .set = t->scene,
+        .sets = t->placed,
+        .set_count = t->placed_count,
+        .drawn = t->placed_drawn,
         .camera = &t->camera,
         .settings = settings_of(t),
         .by_lists = t->given.scene.order == TRIPTYCH_ORDER_LISTS ? &t->drawn_settings : NULL,
@@ -277,8 +399,12 @@ void trip_context_explain_scene(const triptych *t, FILE *out)
     const trip_gaussian_frame_stats s = trip_gaussian_frame_get_stats(t->scene_frame);
     const trip_gaussian_settings settings = settings_of(t);
     const bool lists = t->given.scene.order == TRIPTYCH_ORDER_LISTS;
-    fprintf(out, "scene       %llu Gaussians, harmonics up to degree %d of %u\n",
-            (unsigned long long)t->scene->header.records, settings.degree, t->scene->header.degree);
+    for (unsigned i = 0; i < t->placed_count; i++) {
+        const trip_file_gaussian_header *h = &t->placed[i].set->header;
+        const int own = (int)h->degree;
+        fprintf(out, "scene       %llu Gaussians, harmonics up to degree %d of %d\n",
+                (unsigned long long)h->records, own < settings.degree ? own : settings.degree, own);
+    }
     if (lists)
         fprintf(out, "order       by lists: %u of 3 have weight in the picture\n", s.layers);
     else
@@ -289,4 +415,23 @@ void trip_context_explain_scene(const triptych *t, FILE *out)
             : settings.shape == TRIP_GAUSSIAN_EWA ? "EWA, projected at the centre without limits"
                                                   : "projected at the centre, as in training",
             settings.antialiased ? "; opacity compensated for the blur of pixels" : "");
+}
+
+/* ---- scene files ---- */
+
+int triptych_is_scene_file(const char *path)
+{
+    return trip_scene_file_is(path);
+}
+
+int triptych_read_scene_file(triptych *t, const char *path, triptych_object **objects,
+                             unsigned *count)
+{
+    trip_scope *before = trip_context_enter_anew(t);
+    return trip_context_leave(before, trip_scene_file_read(path, objects, count));
+}
+
+void triptych_free_objects(triptych_object *objects, unsigned count)
+{
+    trip_scene_file_free(objects, count);
 }

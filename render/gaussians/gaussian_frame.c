@@ -16,7 +16,7 @@ enum { BATCH = 1024, LAYERS_MAX = 3, WAYS = 2 };
 
 /* One stream and its next Gaussians. */
 typedef struct source {
-    trip_gaussian_stream *stream;
+    trip_placed_stream *stream;
     trip_gaussian *batch;
     double *keys;
     size_t at, count;
@@ -191,11 +191,13 @@ static trip_gaussian_key key_of_depth(const trip_camera *c)
 
 static int open_stream(trip_gaussian_frame *f, const trip_gaussian_stream_params *params)
 {
-    trip_gaussian_stream **out = &f->sources[f->source_count].stream;
-    int status = trip_gaussian_stream_open(out, f->params.set, params, f->params.budget);
+    const trip_gaussian_frame_params *of = &f->params;
+    trip_placed_stream **out = &f->sources[f->source_count].stream;
+    int status =
+        trip_placed_stream_open(out, of->sets, of->set_count, params, of->drawn, of->budget);
     if (status)
         return status;
-    const trip_gaussian_plan *plan = trip_gaussian_stream_planned(*out);
+    const trip_gaussian_plan *plan = trip_placed_stream_planned(*out);
     f->stats.bricks += plan->bricks;
     if (plan->window_records > f->stats.window_records)
         f->stats.window_records = plan->window_records;
@@ -236,7 +238,7 @@ static int open_streams(trip_gaussian_frame *f, const layer *l)
 static void close_streams(trip_gaussian_frame *f)
 {
     for (int i = 0; i < WAYS; i++) {
-        trip_gaussian_stream_close(f->sources[i].stream);
+        trip_placed_stream_close(f->sources[i].stream);
         f->sources[i].stream = NULL;
     }
     f->source_count = 0;
@@ -245,7 +247,7 @@ static void close_streams(trip_gaussian_frame *f)
 static int fill(source *s)
 {
     s->at = s->count = 0;
-    return trip_gaussian_stream_next(s->stream, s->batch, s->keys, BATCH, &s->count);
+    return trip_placed_stream_next(s->stream, s->batch, s->keys, BATCH, &s->count);
 }
 
 static bool has_any(const source *s)
@@ -325,7 +327,7 @@ static int draw_batch(trip_gaussian_frame *f)
     if (status || count)
         return status;
     for (unsigned i = 0; i < f->source_count; i++)
-        f->stats.bytes_read += trip_gaussian_stream_planned(f->sources[i].stream)->read_bytes;
+        f->stats.bytes_read += trip_placed_stream_planned(f->sources[i].stream)->read_bytes;
     close_streams(f);
     f->drawn++;
     return 0;

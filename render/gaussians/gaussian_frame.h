@@ -1,5 +1,5 @@
-/* Draws one picture of a Gaussian scene, in steps: streams its Gaussians in the order of drawing,
- * composites them into layers, and merges the layers.
+/* Draws one picture of placed Gaussian scenes, in steps: streams their Gaussians in the order of
+ * drawing, composites them into layers, and merges the layers.
  *
  * - The order by depth has one layer. Its Gaussians come in the order of the centres' view depth.
  * - The order by lists has a layer for each axis with weight in the picture. Its Gaussians come in
@@ -11,17 +11,19 @@
 #define TRIP_GAUSSIAN_FRAME_H
 
 #include "gaussian_picture.h"
-#include "gaussian_stream.h"
 #include "gaussian_tiles.h"
+#include "placed_stream.h"
 #include "settings.h"
 #include "task_runner.h"
 
 typedef struct trip_gaussian_frame trip_gaussian_frame;
 
-/* The set and the camera must outlive the frame. */
+/* The sets and the camera must outlive the frame. */
 typedef struct trip_gaussian_frame_params {
-    const trip_gaussian_set *set;
-    const trip_camera *camera; /* index space is the scene's space */
+    const trip_placed_set *sets;
+    unsigned set_count;
+    uint64_t *drawn;           /* Gaussians of each set, added up; NULL: not counted */
+    const trip_camera *camera; /* index space is the common space of the sets */
     trip_gaussian_settings settings;
     /* For the order by lists: its method and h. NULL: by depth. */
     const trip_settings *by_lists;
