@@ -6,27 +6,34 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "command_line.h"
 #include "json.h"
 #include "report.h"
 #include "text.h"
 
-/* Finds or makes the data set of object `i`. Objects with the same path share it. */
+/* Finds or makes the data set of object `i`. Objects with the same path and function share it. */
 static int find_data(placed_input *p, triptych *t, unsigned i,
                      const triptych_brick_options *options)
 {
-    const char *path = p->given[i].path;
-    const cached_wish wish = { .options = *options };
+    const triptych_object *given = &p->given[i];
+    const char *path = given->path;
+    const bool is_scene = triptych_is_gaussians(t, path) != 0;
+    cached_wish wish = { .options = *options };
     p->objects[i].name = path;
+    if (given->function && is_scene)
+        return trip_fail(TRIP_USAGE, "read", path,
+                         "is a Gaussian scene with colours of its own; leave out tf");
+    if (!cached_volume_wanted(path))
+        return 0;
     for (unsigned k = 0; k < i; k++)
-        if (!strcmp(p->given[k].path, path)) {
+        if (!strcmp(p->given[k].path, path) && (is_scene || !given->function)) {
             p->objects[i].path = p->objects[k].path;
             return 0;
         }
-    if (!cached_volume_wanted(path))
-        return 0;
-    if (!triptych_is_gaussians(t, path))
-        return trip_fail(TRIP_USAGE, "read", path,
-                         "is no Gaussian scene; a scene file places Gaussian scenes only");
+    if (given->function) {
+        wish.options.functions = &given->function;
+        wish.options.function_count = 1;
+    }
     const int status = cached_volume_open(&p->volumes[i], t, path, &wish);
     p->objects[i].path = p->volumes[i].path;
     p->bricked += p->volumes[i].seconds > 0;
@@ -34,14 +41,10 @@ static int find_data(placed_input *p, triptych *t, unsigned i,
     return status;
 }
 
-int placed_input_read(placed_input *p, triptych *t, const char *path,
-                      const triptych_brick_options *options)
+static int find_all(placed_input *p, triptych *t, const char *path,
+                    const triptych_brick_options *options)
 {
     int status = library_check_scene_options(options);
-    if (!status)
-        status = triptych_read_scene_file(t, path, &p->given, &p->count);
-    if (status)
-        return status;
     p->objects = calloc(p->count, sizeof *p->objects);
     p->volumes = calloc(p->count, sizeof *p->volumes);
     if (!p->objects || !p->volumes)
@@ -51,6 +54,58 @@ int placed_input_read(placed_input *p, triptych *t, const char *path,
         status = find_data(p, t, i, options);
     }
     return status;
+}
+
+int placed_input_read(placed_input *p, triptych *t, const char *path,
+                      const triptych_brick_options *options)
+{
+    const int status = triptych_read_scene_file(t, path, &p->given, &p->count);
+    return status ? status : find_all(p, t, path, options);
+}
+
+/* Reads X,Y,Z[,SCALE] up to a ';' or the end. Empty text places nothing. */
+static int read_place(const char **text, double m[3][4])
+{
+    double n[4] = { 0, 0, 0, 1 };
+    int count = 0, used = 0;
+    while (**text && **text != ';' && count < 4 &&
+           sscanf(*text, count ? ",%lf%n" : "%lf%n", &n[count], &used) == 1) {
+        count++;
+        *text += used;
+    }
+    const bool bad = (**text && **text != ';') || (count > 0 && count < 3) ||
+                     !isfinite(n[0] + n[1] + n[2] + n[3]) || !(n[3] > 0);
+    if (bad)
+        return trip_option_fail("--place", "must be X,Y,Z or X,Y,Z,SCALE for each input, with ';' "
+                                           "between inputs and a SCALE above 0");
+    *text += **text == ';';
+    for (int a = 0; a < 3; a++) {
+        m[a][a] = n[3];
+        m[a][3] = n[a];
+    }
+    return 0;
+}
+
+int placed_input_list(placed_input *p, triptych *t, const char *const *paths, unsigned count,
+                      const char *places, const triptych_brick_options *options)
+{
+    int status = 0;
+    const char *text = places ? places : "";
+    p->given = calloc(count, sizeof *p->given);
+    if (!p->given)
+        return trip_fail(TRIP_ERROR, "read", paths[0], "out of memory");
+    for (; p->count < count && !status; p->count++) {
+        triptych_object *o = &p->given[p->count];
+        *o = (triptych_object){ .path = strdup(paths[p->count]), .matrix = TRIPTYCH_UNPLACED };
+        if (triptych_is_scene_file(paths[p->count]))
+            return trip_option_fail(paths[p->count],
+                                    "is a scene file; give it alone, or list its objects");
+        status = o->path ? read_place(&text, o->matrix)
+                         : trip_fail(TRIP_ERROR, "read", paths[0], "out of memory");
+    }
+    if (!status && *text)
+        status = trip_option_fail("--place", "has more places than there are inputs");
+    return status ? status : find_all(p, t, paths[0], options);
 }
 
 int placed_input_open(const placed_input *p, triptych *t, const char *path,
@@ -74,9 +129,7 @@ void placed_input_close(placed_input *p)
 
 static const char *kind_of(triptych *t, const char *path)
 {
-    return triptych_is_gaussians(t, path) ? "Gaussian scene"
-           : cached_volume_wanted(path)   ? "other"
-                                          : "data set";
+    return triptych_is_gaussians(t, path) ? "Gaussian scene" : "volume";
 }
 
 static int print_json(triptych *t, const char *path, const triptych_object *objects, unsigned count)
@@ -89,6 +142,8 @@ static int print_json(triptych *t, const char *path, const triptych_object *obje
         cJSON *o = cJSON_CreateObject();
         cJSON_AddStringToObject(o, "data", from->path);
         cJSON_AddStringToObject(o, "kind", kind_of(t, from->path));
+        if (from->function)
+            cJSON_AddStringToObject(o, "tf", from->function);
         double m[16] = { [15] = 1 };
         memcpy(m, from->matrix, sizeof from->matrix);
         cJSON_AddItemToObject(o, "matrix", cJSON_CreateDoubleArray(m, 16));

@@ -1,4 +1,4 @@
-/* The objects of a scene file: finds or makes their data sets in the cache, and opens them
+/* Several objects in one picture: finds or makes their data sets in the cache, and opens them
  * together. Main thread only, except placed_input_open(). */
 #ifndef TRIP_CLI_PLACED_INPUT_H
 #define TRIP_CLI_PLACED_INPUT_H
@@ -19,6 +19,11 @@ typedef struct placed_input {
  * after a failure. */
 int placed_input_read(placed_input *p, triptych *t, const char *path,
                       const triptych_brick_options *options);
+/* Finds or makes the data sets of inputs that are named one by one. `places` has X,Y,Z or
+ * X,Y,Z,SCALE for each, with a
+ * ';' between them; NULL places nothing. */
+int placed_input_list(placed_input *p, triptych *t, const char *const *paths, unsigned count,
+                      const char *places, const triptych_brick_options *options);
 /* Opens the objects, or the data set `path` if there are none. Any thread. */
 int placed_input_open(const placed_input *p, triptych *t, const char *path,
                       const triptych_resources *resources);

@@ -105,6 +105,7 @@ void trip_context_show_stage(void *user, const char *stage, uint64_t done, uint6
 void triptych_cancel(triptych *t)
 {
     trip_scope_cancel(&t->scope);
+    trip_context_cancel_mixed(t);
 }
 
 trip_scope *trip_context_enter(triptych *t)
@@ -248,6 +249,7 @@ static void close_data(triptych *t)
     trip_context_drop_level(t);
     trip_context_drop_heat(t);
     trip_context_close_scene(t);
+    trip_context_close_mixed(t);
     session_close(&t->session);
     free(t->name);
     t->name = NULL;
@@ -282,7 +284,19 @@ static int check_resources(const triptych_resources *r)
     return known ? 0 : trip_fail(TRIP_USAGE, "render", "resources", "unknown renderer or engine");
 }
 
-/* Opens one volume, or one or more scenes. */
+/* Returns whether the objects are more than scenes and one volume that stays where it is. */
+static bool places_volumes(const triptych_object *objects, unsigned count)
+{
+    static const triptych_object unplaced = { .matrix = TRIPTYCH_UNPLACED };
+    const bool placed =
+        count > 1 || memcmp(objects->matrix, unplaced.matrix, sizeof unplaced.matrix) != 0;
+    bool volumes = false;
+    for (unsigned i = 0; i < count; i++)
+        volumes |= !trip_gaussian_set_is(objects[i].path);
+    return volumes && placed;
+}
+
+/* Opens one volume, or one or more objects. */
 static int open_objects(triptych *t, const triptych_object *objects, unsigned count,
                         const triptych_resources *resources)
 {
@@ -302,6 +316,8 @@ static int open_objects(triptych *t, const triptych_object *objects, unsigned co
     t->choices_read = 0;
     if (!t->name)
         status = trip_fail(TRIP_ERROR, "render", path, "out of memory");
+    else if (places_volumes(objects, count))
+        status = trip_context_open_mixed(t, objects, count, wanted.memory_bytes);
     else if (count > 1 || trip_gaussian_set_is(path))
         status = trip_context_open_scenes(t, objects, count, wanted.memory_bytes);
     else
@@ -328,12 +344,6 @@ int triptych_open_objects(triptych *t, const triptych_object *objects, unsigned 
     if (!status && (count < 1 || count > TRIPTYCH_OBJECTS_MAX))
         status = trip_fail(TRIP_USAGE, "render", "objects", "must be 1 to %d, not %u",
                            TRIPTYCH_OBJECTS_MAX, count);
-    for (unsigned i = 0; i < count && !status; i++)
-        if (!trip_gaussian_set_is(objects[i].path))
-            status =
-                trip_fail(TRIP_USAGE, "render", objects[i].name ? objects[i].name : objects[i].path,
-                          "is no Gaussian scene; a picture of several objects shows Gaussian "
-                          "scenes only");
     trip_context_leave(before, status);
     return status ? status : open_objects(t, objects, count, resources);
 }

@@ -51,8 +51,8 @@ int trip_context_open_scenes(triptych *t, const triptych_object *objects, unsign
 {
     t->session = (session){ .input = t->name };
     int status = trip_budget_create(&t->session.budget, memory_bytes);
-    t->placed = status ? NULL : calloc(count, sizeof *t->placed);
-    t->placed_drawn = status ? NULL : calloc(count, sizeof *t->placed_drawn);
+    t->placed = status ? NULL : calloc(count + 1, sizeof *t->placed);
+    t->placed_drawn = status ? NULL : calloc(count + 1, sizeof *t->placed_drawn);
     if (!status && (!t->placed || !t->placed_drawn))
         status = trip_fail(TRIP_ERROR, "render", t->name, "out of memory");
     for (unsigned i = 0; i < count && !status; i++) {
@@ -106,9 +106,10 @@ unsigned triptych_get_objects(const triptych *t, const uint64_t **drawn)
 int trip_context_check_volume(const triptych *t)
 {
     int status = trip_context_check_open(t);
-    return !status && t->scene ? trip_fail(TRIP_USAGE, "render", t->name,
-                                           "is a Gaussian scene; this applies to volumes only")
-                               : status;
+    return !status && trip_context_draws_scene(t)
+               ? trip_fail(TRIP_USAGE, "render", t->name,
+                           "is a Gaussian scene; this applies to volumes only")
+               : status;
 }
 
 /* Adds the corners of a placed box to bounds. */
@@ -154,7 +155,7 @@ int triptych_get_scene(triptych *t, triptych_scene *out)
     trip_scope *before = trip_context_enter(t);
     int status = trip_context_check_open(t);
     *out = (triptych_scene){ 0 };
-    if (!status && !t->scene)
+    if (!status && (!t->scene || t->mixed))
         status = trip_fail(TRIP_USAGE, "render", t->name, "is not a Gaussian scene");
     if (status)
         return trip_context_leave(before, status);
@@ -167,29 +168,37 @@ int triptych_get_scene(triptych *t, triptych_scene *out)
 
 int triptych_is_scene(const triptych *t)
 {
-    return t->scene != NULL;
+    return trip_context_draws_scene(t);
 }
 
 /* ---- views ---- */
 
+/* Sets the box of all scenes: of most centres, or of everything that the Gaussians reach. */
+static void add_scenes(const triptych *t, bool reach, trip_view_object *o)
+{
+    for (int a = 0; a < 3; a++) {
+        o->lo[a] = INFINITY;
+        o->hi[a] = -INFINITY;
+    }
+    for (unsigned i = 0; i < t->placed_count; i++) {
+        const trip_file_gaussian_header *of = &t->placed[i].set->header;
+        add_box(&t->placed[i].placement, reach ? of->reach_lo : of->typical_lo,
+                reach ? of->reach_hi : of->typical_hi, o->lo, o->hi);
+    }
+}
+
 trip_view_object trip_context_scene_object(const triptych *t)
 {
-    const trip_file_gaussian_header *h = &t->scene->header;
+    const trip_file_gaussian_header none = { 0 }, *h = t->scene ? &t->scene->header : &none;
     trip_view_object o = { .index_to_world = trip_affine_identity() };
     const bool y_down = h->flags & TRIP_GAUSSIAN_Y_DOWN;
     o.up = y_down ? trip_v3(0, -1, 0) : trip_v3(0, 1, 0);
     o.front = y_down ? trip_v3(0, 0, -1) : trip_v3(0, 0, 1);
-    bool point = t->placed_count == 1;
-    for (int a = 0; a < 3; a++) {
-        point &= h->typical_lo[a] >= h->typical_hi[a];
-        o.lo[a] = INFINITY;
-        o.hi[a] = -INFINITY;
-    }
-    for (unsigned i = 0; i < t->placed_count; i++) {
-        const trip_file_gaussian_header *of = &t->placed[i].set->header;
-        add_box(&t->placed[i].placement, point ? of->reach_lo : of->typical_lo,
-                point ? of->reach_hi : of->typical_hi, o.lo, o.hi);
-    }
+    add_scenes(t, false, &o);
+    if (!t->mixed && o.lo[0] >= o.hi[0] && o.lo[1] >= o.hi[1] && o.lo[2] >= o.hi[2])
+        add_scenes(t, true, &o); /* the centres are one point */
+    if (t->mixed)
+        trip_context_add_mixed(t, &o);
     return o;
 }
 
@@ -198,7 +207,9 @@ trip_view_object trip_context_scene_object(const triptych *t)
 static int check(const triptych *t, bool *reference)
 {
     const triptych_renderer r = t->resources.renderer;
-    *reference = r == TRIPTYCH_RENDERER_REFERENCE;
+    *reference = r == TRIPTYCH_RENDERER_REFERENCE || r == TRIPTYCH_RENDERER_INTEGRAL;
+    if (t->mixed) /* some settings are for its volumes */
+        return 0;
     if (r == TRIPTYCH_RENDERER_INTEGRAL)
         return trip_fail(TRIP_USAGE, "render", t->name,
                          "is a Gaussian scene; use --renderer cpu, gl or reference");
@@ -247,13 +258,14 @@ static trip_gaussian_settings settings_of(const triptych *t)
         .early_termination = g->all.early_termination == TRIPTYCH_ZERO ? DBL_MIN /* never */
                                                                        : g->all.early_termination,
         .clip = trip_context_clip(t),
-        .depth = g->all.depth,
+        .depth = g->all.depth || t->mixed,
     };
     for (unsigned i = 0; i < t->placed_count; i++)
         out.antialiased &= (t->placed[i].set->header.flags & TRIP_GAUSSIAN_ANTIALIASED) != 0;
     if (out.degree > degree_of(t))
         out.degree = degree_of(t);
-    memcpy(out.background, t->settings.background, sizeof out.background);
+    if (!t->mixed) /* it comes behind everything */
+        memcpy(out.background, t->settings.background, sizeof out.background);
     return out;
 }
 
@@ -329,16 +341,24 @@ int trip_context_begin_scene(triptych *t)
         .budget = t->session.budget,
         .runner = trip_renderer_runner(t->renderer),
     };
-    status = trip_gaussian_frame_begin(&t->scene_frame, &params);
+    status = t->scene ? trip_gaussian_frame_begin(&t->scene_frame, &params) : 0;
+    if (!status && t->mixed)
+        status = trip_context_begin_mixed(t, side);
     t->begun = t->drawn = !status;
     if (status)
         trip_context_end_scene(t);
     return status;
 }
 
+static trip_gaussian_frame_stats stats_of_frame(const triptych *t)
+{
+    return t->scene_frame ? trip_gaussian_frame_get_stats(t->scene_frame)
+                          : (trip_gaussian_frame_stats){ 0 };
+}
+
 static triptych_frame_stats stats_of(const triptych *t)
 {
-    const trip_gaussian_frame_stats s = trip_gaussian_frame_get_stats(t->scene_frame);
+    const trip_gaussian_frame_stats s = stats_of_frame(t);
     const trip_gaussian_settings settings = settings_of(t);
     const bool reference = t->resources.renderer == TRIPTYCH_RENDERER_REFERENCE;
     return (triptych_frame_stats){
@@ -369,7 +389,8 @@ int trip_context_take_scene(triptych *t, float *rgba, float *depth)
 {
     const int side = t->drawn_settings.samples;
     float *picture = side > 1 ? t->before : rgba;
-    int status = trip_gaussian_frame_picture(t->scene_frame, picture, depth);
+    int status = t->mixed ? trip_context_take_mixed(t, picture)
+                          : trip_gaussian_frame_picture(t->scene_frame, picture, depth);
     if (!status && side > 1)
         trip_context_take_means(picture, side, t->turned.width, t->turned.height, rgba);
     if (!status && t->given.all.normalise)
@@ -379,6 +400,8 @@ int trip_context_take_scene(triptych *t, float *rgba, float *depth)
         const trip_renderer *r = draws_by_gl(t) ? t->device_renderer : t->renderer;
         snprintf(t->device, sizeof t->device, "%s", r->ops->device(r));
         t->stats = stats_of(t);
+        if (t->mixed)
+            trip_context_add_mixed_stats(t, &t->stats);
         t->has_stats = true;
     }
     return status;
@@ -388,6 +411,8 @@ void trip_context_end_scene(triptych *t)
 {
     trip_gaussian_frame_end(t->scene_frame);
     t->scene_frame = NULL;
+    if (t->mixed)
+        trip_context_end_mixed(t);
     trip_budget_release(t->session.budget, t->before, t->before_bytes);
     t->before = NULL;
     t->before_bytes = 0;
@@ -396,7 +421,7 @@ void trip_context_end_scene(triptych *t)
 
 void trip_context_explain_scene(const triptych *t, FILE *out)
 {
-    const trip_gaussian_frame_stats s = trip_gaussian_frame_get_stats(t->scene_frame);
+    const trip_gaussian_frame_stats s = stats_of_frame(t);
     const trip_gaussian_settings settings = settings_of(t);
     const bool lists = t->given.scene.order == TRIPTYCH_ORDER_LISTS;
     for (unsigned i = 0; i < t->placed_count; i++) {
@@ -405,6 +430,8 @@ void trip_context_explain_scene(const triptych *t, FILE *out)
         fprintf(out, "scene       %llu Gaussians, harmonics up to degree %d of %d\n",
                 (unsigned long long)h->records, own < settings.degree ? own : settings.degree, own);
     }
+    if (t->mixed)
+        trip_context_explain_mixed(t, out);
     if (lists)
         fprintf(out, "order       by lists: %u of 3 have weight in the picture\n", s.layers);
     else

@@ -207,9 +207,18 @@ static char *path_of(const char *file, const char *data)
     return path;
 }
 
+/* Returns a preset, or a path relative to the file's folder, for free(). A path has a '.' or a '/'.
+ */
+static char *function_of(const char *file, const char *tf)
+{
+    return strpbrk(tf, "./") ? path_of(file, tf) : strdup(tf);
+}
+
 static int read_object(const reading *r, const cJSON *from, triptych_object *out)
 {
-    static const char *const names[] = { "data", "translate", "rotate", "scale", "matrix", NULL };
+    static const char *const names[] = { "data",   "translate", "rotate", "scale",
+                                         "matrix", "tf",        NULL };
+    const cJSON *tf = cJSON_GetObjectItemCaseSensitive(from, "tf");
     struct stat st;
     if (!cJSON_IsObject(from))
         return fail(r, "is no JSON object", "");
@@ -218,6 +227,10 @@ static int read_object(const reading *r, const cJSON *from, triptych_object *out
     if (!status && !(cJSON_IsString(data) && *data->valuestring))
         status = fail(r, " must be the path of a file", "data");
     if (!status && !(out->path = path_of(r->path, data->valuestring)))
+        status = fail(r, "out of memory", "");
+    if (!status && tf && !(cJSON_IsString(tf) && *tf->valuestring))
+        status = fail(r, " must be a preset or the path of a file", "tf");
+    if (!status && tf && !(out->function = function_of(r->path, tf->valuestring)))
         status = fail(r, "out of memory", "");
     if (!status)
         status = get_placement(r, from, out->matrix);
@@ -283,6 +296,8 @@ void trip_scene_file_free(triptych_object *objects, unsigned count)
     for (unsigned i = 0; i < count; i++) {
         char *path; /* not const: path_of() made it */
         memcpy(&path, &objects[i].path, sizeof path);
+        free(path);
+        memcpy(&path, &objects[i].function, sizeof path);
         free(path);
     }
     free(objects);

@@ -237,9 +237,10 @@ enum { TRIPTYCH_OBJECTS_MAX = 1000 };
 
 /* A data set and its place in the picture. */
 typedef struct triptych_object {
-    const char *path;    /* of the data set */
-    const char *name;    /* in messages; NULL: the path */
-    double matrix[3][4]; /* maps the data set's space into the common space */
+    const char *path;     /* of the data set */
+    const char *name;     /* in messages; NULL: the path */
+    double matrix[3][4];  /* maps the data set's space into the common space */
+    const char *function; /* file or preset of a volume; NULL: the function of the picture */
 } triptych_object;
 
 /* The matrix of an object that stays where it is. */
@@ -251,8 +252,8 @@ typedef struct triptych_object {
         }                                                                                          \
     }
 
-/* Opens Gaussian scenes for one picture, instead of triptych_open(). A matrix may move, turn and
- * scale evenly. One path may occur several times, and is opened once. */
+/* Opens Gaussian scenes and at most 16 volumes for one picture, instead of triptych_open(). A
+ * matrix may move, turn and scale evenly. One path may occur several times, and is opened once. */
 TRIPTYCH_API int triptych_open_objects(triptych *t, const triptych_object *objects, unsigned count,
                                        const triptych_resources *resources);
 /* Returns the number of scenes of the open picture: 0 if a volume or nothing is open. Sets *drawn

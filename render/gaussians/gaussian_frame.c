@@ -38,6 +38,8 @@ struct trip_gaussian_frame {
     source sources[WAYS];
     unsigned source_count; /* of the layer that is drawn; 0 until its streams are open */
     trip_gaussian *batch;  /* in order, of all sources */
+    double stop;           /* the order by depth pauses at this key */
+    bool paused;           /* the next Gaussian has a key from `stop` on */
     float *picture;        /* of one layer, with distances behind it; NULL for one layer */
     trip_gaussian_frame_stats stats;
 };
@@ -264,9 +266,12 @@ static int take_batch(trip_gaussian_frame *f, const trip_gaussian **batch, size_
     if (!status && f->source_count > 1 && !has_any(b))
         status = fill(b);
     if (status || f->source_count == 1) {
-        *batch = a->batch;
-        *count = status ? 0 : a->count;
-        a->at = a->count;
+        const size_t first = a->at;
+        while (!status && has_any(a) && a->keys[a->at] < f->stop)
+            a->at++;
+        *batch = a->batch + first;
+        *count = a->at - first;
+        f->paused = !status && !*count && has_any(a);
     } else {
         *batch = f->batch;
         *count = 0;
@@ -324,7 +329,7 @@ static int draw_batch(trip_gaussian_frame *f)
         status = end_layer(l);
     f->stats.draw_ms += trip_now_ms() - begun;
     f->stats.gaussians += count;
-    if (status || count)
+    if (status || count || f->paused)
         return status;
     for (unsigned i = 0; i < f->source_count; i++)
         f->stats.bytes_read += trip_placed_stream_planned(f->sources[i].stream)->read_bytes;
@@ -333,17 +338,24 @@ static int draw_batch(trip_gaussian_frame *f)
     return 0;
 }
 
-int trip_gaussian_frame_step(trip_gaussian_frame *f, uint64_t deadline_ns)
+int trip_gaussian_frame_step_to(trip_gaussian_frame *f, double depth, uint64_t deadline_ns)
 {
     int status = 0;
-    while (!status && f->drawn < f->layer_count) {
+    f->stop = depth;
+    f->paused = false;
+    while (!status && f->drawn < f->layer_count && !f->paused) {
         status = draw_batch(f);
         if (!status)
             status = trip_frame_poll();
-        if (!status && f->drawn < f->layer_count && trip_now_ns() >= deadline_ns)
+        if (!status && f->drawn < f->layer_count && !f->paused && trip_now_ns() >= deadline_ns)
             return TRIP_FRAME_MORE;
     }
     return status ? status : TRIP_FRAME_DONE;
+}
+
+int trip_gaussian_frame_step(trip_gaussian_frame *f, uint64_t deadline_ns)
+{
+    return trip_gaussian_frame_step_to(f, INFINITY, deadline_ns);
 }
 
 /* Adds w^2 times a layer to the sums. Distances are weighted by opacity too, as in layer.h. */

@@ -47,6 +47,8 @@ int trip_gaussian_frame_begin(trip_gaussian_frame **out, const trip_gaussian_fra
 /* Draws until the deadline (CLOCK_MONOTONIC), and at least one batch. Returns TRIP_FRAME_DONE or
  * TRIP_FRAME_MORE (renderer.h), or a failure. */
 int trip_gaussian_frame_step(trip_gaussian_frame *f, uint64_t deadline_ns);
+/* Draws in the order by depth up to `depth` (camera.h). Later Gaussians wait. */
+int trip_gaussian_frame_step_to(trip_gaussian_frame *f, double depth, uint64_t deadline_ns);
 /* Writes the picture drawn so far: width * height * 4 floats, premultiplied, row 0 at the top, over
  * the background. With settings.depth also width * height distances; otherwise `depth` is NULL. */
 int trip_gaussian_frame_picture(trip_gaussian_frame *f, float *rgba, float *depth);
