@@ -23,6 +23,7 @@ static const struct {
     bool from_disk;     /* the frames of the scene read from disk, not from memory */
     bool makes_volumes; /* makes its own volumes if no data set is named */
     bool opens;         /* opens the data set itself */
+    bool of_scenes;     /* also measures data sets of Gaussian scenes */
 } tables[] = {
     { .name = "orders", .run_scene = bench_orders },
     { .name = "submit", .run_scene = bench_submit },
@@ -30,7 +31,7 @@ static const struct {
     { .name = "renderers", .run = bench_renderers },
     { .name = "popping", .run_scene = bench_popping },
     { .name = "levels", .run = bench_levels, .makes_volumes = true },
-    { .name = "flight", .run = bench_flight, .opens = true },
+    { .name = "flight", .run = bench_flight, .opens = true, .of_scenes = true },
     { .name = "ewa", .run = bench_ewa },
     { .name = "variants", .run_scene = bench_variants },
 };
@@ -127,7 +128,8 @@ static int check_plot(const bench_options *o)
 static int measure(bench_options *o, bench_report *r)
 {
     const size_t table = table_of(o);
-    if (o->input && (trip_gaussian_set_is(o->input) || trip_gaussian_file_is(o->input)))
+    const bool scene = o->input && trip_gaussian_set_is(o->input);
+    if (o->input && (trip_gaussian_file_is(o->input) || (scene && !tables[table].of_scenes)))
         return trip_fail(TRIP_USAGE, "usage", o->input,
                          "is a Gaussian scene; `triptych render` draws it");
     if (!o->input && tables[table].makes_volumes)

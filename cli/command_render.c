@@ -143,7 +143,7 @@ static int check_objects(const drawing *d)
     for (unsigned i = 0; i < d->placed.count; i++)
         scenes += triptych_is_gaussians(d->t, d->placed.given[i].path) != 0;
     const bool mixed = scenes && scenes < d->placed.count;
-    int status = mixed ? 0 : draw_settings_check_kind(&o->settings, scenes > 0);
+    int status = mixed ? 0 : draw_settings_check_kind(&o->settings, &o->resources, scenes > 0);
     if (!status && o->quality.error > 0)
         status = trip_option_fail("--error", "does not apply to several objects in one picture");
     if (!status && o->field == RENDER_FIELD_SOURCE)
@@ -166,8 +166,8 @@ static int check_input(const drawing *d)
         if (volume)
             return trip_option_fail(volume, TRIP_ONE_VOLUME_A_PICTURE);
     }
-    const bool is_scene = library_is_scene(d->t, o->input);
-    int status = draw_settings_check_kind(&o->settings, is_scene);
+    const bool is_scene = triptych_is_gaussians(d->t, o->input) != 0;
+    int status = library_check_kind(d->t, o->input, &o->settings, &o->resources, &o->function);
     if (!status && is_scene && o->quality.error > 0)
         status = library_fail_scene_option("error");
     return status;

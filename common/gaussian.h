@@ -5,6 +5,7 @@
 #define TRIP_GAUSSIAN_H
 
 #include <stdbool.h>
+#include <stdint.h>
 
 enum { TRIP_SH_DEGREE_MAX = 3, TRIP_SH_MAX = 16 };
 
@@ -18,6 +19,7 @@ typedef struct trip_gaussian {
     float sh[TRIP_SH_MAX][3];
     /* Trained with a compensated opacity, as trip_gaussian_settings.antialiased says of all. */
     bool antialiased;
+    uint64_t merged; /* 1: of a coarse level, where it stands for Gaussians of the scene */
 } trip_gaussian;
 
 /* Returns the number of coefficients up to a degree: 1, 4, 9 or 16. */

@@ -383,9 +383,9 @@ static const trip_option rows[DRAW_OPTIONS] = {
                              CHOICE(interpolations) },
     [DRAW_LOD] = { "lod", "PX|auto",
                    "Draws distant parts by coarse levels with voxels at most PX pixels wide",
-                   "auto, as --quality needs", "0 draws the finest level only",
-                   .group = DRAW_GROUP_ACCURACY, .measured = true, .type = TRIP_OPTION_AUTO_NUMBER,
-                   AT(lod.voxel_px), .lo = 0, .hi = 1000 },
+                   "auto, as --quality needs; 1 for Gaussian scenes",
+                   "0 draws the finest level only", .group = DRAW_GROUP_ACCURACY, .measured = true,
+                   .type = TRIP_OPTION_AUTO_NUMBER, AT(lod.voxel_px), .lo = 0, .hi = 1000 },
     [DRAW_MAX_BYTES] = { "max-bytes", "SIZE",
                          "Draws coarser levels, so that at most SIZE of codes and normals is in "
                          "view, for example 64M",

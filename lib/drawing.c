@@ -361,7 +361,7 @@ static int prepare(triptych *t)
     if (!status)
         status = draw_settings_check(&t->given, &renderer, false);
     if (!status)
-        status = draw_settings_check_kind(&t->given, false);
+        status = draw_settings_check_kind(&t->given, r, false);
     if (status)
         return status;
     if (t->renderer && t->required != renderer)
@@ -741,9 +741,7 @@ int triptych_step(triptych *t, uint64_t deadline_ns)
     trip_scope *before = trip_context_enter(t);
     int status = check_drawing(t);
     if (!status && trip_context_draws_scene(t))
-        return trip_context_leave(before,
-                                  t->mixed ? trip_context_step_mixed(t, deadline_ns)
-                                           : trip_gaussian_frame_step(t->scene_frame, deadline_ns));
+        return trip_context_leave(before, trip_context_step_scene(t, deadline_ns));
     if (!status)
         status = trip_frame_step(&t->drawing, deadline_ns);
     while (status == TRIP_FRAME_DONE && has_next(t)) {

@@ -53,6 +53,7 @@ struct triptych {
     struct trip_mixed *mixed;                /* volumes beside scenes; NULL: none */
     struct trip_gaussian_frame *scene_frame; /* the begun frame of a scene */
     trip_renderer *device_renderer;          /* composites the scene (gl); NULL: `renderer` does */
+    bool scene_done;                         /* scene_frame is complete */
     double scene_opacity;                    /* factor of the optical depth; 0 means 1 */
     double begun_ms;                         /* when scene_frame was begun */
     bool open, has_function;
@@ -203,6 +204,7 @@ int trip_context_verify_scenes(const triptych *t);
 int trip_context_check_volume(const triptych *t);
 trip_view_object trip_context_scene_object(const triptych *t);
 int trip_context_begin_scene(triptych *t);
+int trip_context_step_scene(triptych *t, uint64_t deadline_ns);
 int trip_context_take_scene(triptych *t, float *rgba, float *depth);
 void trip_context_end_scene(triptych *t);
 void trip_context_explain_scene(const triptych *t, FILE *out);

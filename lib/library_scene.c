@@ -140,6 +140,7 @@ static void add_to_scene(const triptych *t, unsigned i, triptych_scene *out)
     add_box(&p->placement, h->centre_lo, h->centre_hi, out->lo, out->hi);
     add_box(&p->placement, h->typical_lo, h->typical_hi, out->typical_lo, out->typical_hi);
     out->gaussians += h->records;
+    out->coarse += h->list_records - h->records;
     out->degree = (int)h->degree > out->degree ? (int)h->degree : out->degree;
     out->antialiased &= (h->flags & TRIP_GAUSSIAN_ANTIALIASED) != 0;
     out->flat &= (h->flags & TRIP_GAUSSIAN_FLAT) != 0;
@@ -163,6 +164,9 @@ int triptych_get_scene(triptych *t, triptych_scene *out)
     out->y_down = (t->scene->header.flags & TRIP_GAUSSIAN_Y_DOWN) != 0;
     for (unsigned i = 0; i < t->placed_count; i++)
         add_to_scene(t, i, out);
+    const trip_view_object object = trip_context_scene_object(t);
+    memcpy(out->typical_lo, object.lo, sizeof object.lo);
+    memcpy(out->typical_hi, object.hi, sizeof object.hi);
     return trip_context_leave(before, 0);
 }
 
@@ -204,21 +208,8 @@ trip_view_object trip_context_scene_object(const triptych *t)
 
 /* ---- frames ---- */
 
-static int check(const triptych *t, bool *reference)
-{
-    const triptych_renderer r = t->resources.renderer;
-    *reference = r == TRIPTYCH_RENDERER_REFERENCE || r == TRIPTYCH_RENDERER_INTEGRAL;
-    if (t->mixed) /* some settings are for its volumes */
-        return 0;
-    if (r == TRIPTYCH_RENDERER_INTEGRAL)
-        return trip_fail(TRIP_USAGE, "render", t->name,
-                         "is a Gaussian scene; use --renderer cpu, gl or reference");
-    if (t->given.splat.footprint == TRIPTYCH_FOOTPRINT_FIXED)
-        return trip_option_fail("--kernel", "fixed does not apply to Gaussian scenes");
-    if (t->given.all.method == TRIPTYCH_METHOD_IMAGE)
-        return trip_option_fail("--method", "image does not apply to Gaussian scenes");
-    return draw_settings_check_kind(&t->given, true);
-}
+/* Gaussians wider than a pixel are drawn as they are. */
+#define DEFAULT_LOD_PX 1.0
 
 static int make_camera(triptych *t, int side)
 {
@@ -305,13 +296,21 @@ static const trip_tile_device *device_of(const triptych *t)
     return t->device_renderer ? t->device_renderer->ops->tile_device(t->device_renderer) : NULL;
 }
 
+/* Returns the width of voxels in pixels that coarse Gaussians may stand for. */
+static double lod_of(const triptych *t)
+{
+    const double given = t->given.lod.voxel_px;
+    return given == TRIPTYCH_ZERO ? 0 : given > 0 ? given : DEFAULT_LOD_PX;
+}
+
 int trip_context_begin_scene(triptych *t)
 {
-    bool reference;
+    const bool reference = t->resources.renderer == TRIPTYCH_RENDERER_REFERENCE ||
+                           t->resources.renderer == TRIPTYCH_RENDERER_INTEGRAL;
     const int side = t->given.all.samples > 0 ? t->given.all.samples : 1;
     int status = trip_context_check_idle(t, true);
-    if (!status)
-        status = check(t, &reference);
+    if (!status && !t->mixed) /* some settings are for its volumes */
+        status = draw_settings_check_kind(&t->given, &t->resources, true);
     if (!status && !t->has_view)
         status = trip_context_find_view(t, &(triptych_view){ 0 });
     if (!status && !t->renderer) /* lends its threads */
@@ -335,6 +334,7 @@ int trip_context_begin_scene(triptych *t)
         .drawn = t->placed_drawn,
         .camera = &t->camera,
         .settings = settings_of(t),
+        .lod_px = lod_of(t) * side,
         .by_lists = t->given.scene.order == TRIPTYCH_ORDER_LISTS ? &t->drawn_settings : NULL,
         .reference = reference,
         .device = device_of(t),
@@ -345,6 +345,7 @@ int trip_context_begin_scene(triptych *t)
     if (!status && t->mixed)
         status = trip_context_begin_mixed(t, side);
     t->begun = t->drawn = !status;
+    t->scene_done = false;
     if (status)
         trip_context_end_scene(t);
     return status;
@@ -367,6 +368,7 @@ static triptych_frame_stats stats_of(const triptych *t)
         .draw_ms = s.draw_ms,
         .merge_ms = s.merge_ms,
         .splats = s.gaussians,
+        .lod_px = lod_of(t),
         .bytes_read = s.bytes_read,
         .reads = s.bricks,
         .memory_bytes = trip_budget_limit_bytes(t->session.budget),
@@ -385,6 +387,30 @@ static triptych_frame_stats stats_of(const triptych *t)
     };
 }
 
+/* Drawing reports its progress in steps of this time. */
+enum { REPORT_NS = 50000000 };
+
+int trip_context_step_scene(triptych *t, uint64_t deadline_ns)
+{
+    int status = t->mixed ? trip_context_step_mixed(t, deadline_ns) : TRIP_FRAME_MORE;
+    while (!t->mixed && status == TRIP_FRAME_MORE) {
+        const uint64_t next_ns = trip_now_ns() + REPORT_NS;
+        const bool reports = t->show && next_ns < deadline_ns;
+        status = trip_gaussian_frame_step(t->scene_frame, reports ? next_ns : deadline_ns);
+        if (t->show && status >= 0) {
+            uint64_t all = 0;
+            for (unsigned i = 0; i < t->placed_count; i++)
+                all += t->placed[i].set->header.records;
+            const double done = trip_gaussian_frame_get_stats(t->scene_frame).done;
+            trip_context_show_stage(t, "splat", (uint64_t)(done * (double)all), all);
+        }
+        if (!reports)
+            break;
+    }
+    t->scene_done = status == TRIP_FRAME_DONE;
+    return status;
+}
+
 int trip_context_take_scene(triptych *t, float *rgba, float *depth)
 {
     const int side = t->drawn_settings.samples;
@@ -396,7 +422,7 @@ int trip_context_take_scene(triptych *t, float *rgba, float *depth)
     if (!status && t->given.all.normalise)
         trip_normalise(rgba, (size_t)t->turned.width * (size_t)t->turned.height,
                        t->settings.background);
-    if (!status) {
+    if (!status && t->scene_done) {
         const trip_renderer *r = draws_by_gl(t) ? t->device_renderer : t->renderer;
         snprintf(t->device, sizeof t->device, "%s", r->ops->device(r));
         t->stats = stats_of(t);
@@ -437,6 +463,11 @@ void trip_context_explain_scene(const triptych *t, FILE *out)
     else
         fprintf(out, "order       by depth: at most %llu Gaussians wait in the window\n",
                 (unsigned long long)s.window_records);
+    if (lod_of(t) > 0)
+        fprintf(out, "levels      coarse Gaussians for voxels of at most %g pixels: %llu of %llu\n",
+                lod_of(t), (unsigned long long)s.coarse, (unsigned long long)s.planned);
+    else
+        fprintf(out, "levels      the Gaussians of the scene alone\n");
     fprintf(out, "footprint   %s%s\n",
             settings.shape == TRIP_GAUSSIAN_EXACT ? "exact, along each pixel's ray"
             : settings.shape == TRIP_GAUSSIAN_EWA ? "EWA, projected at the centre without limits"

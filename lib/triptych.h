@@ -93,7 +93,7 @@ TRIPTYCH_API void triptych_set_messages(triptych *t, triptych_message_callback t
  * calling thread. NULL, the default, reports no progress. Drawing has
  * these stages; triptych_brick.h lists the stages of bricking.
  * - "draw": voxels, in post
- * - "splat": splats, in pre
+ * - "splat": splats, in pre; Gaussians, in scenes
  * - "count": splats, with triptych_settings.count_exactly
  * - "integrate": pixels, with the integral renderer */
 TRIPTYCH_API void triptych_set_progress(triptych *t, triptych_progress_callback show, void *user);
@@ -209,14 +209,16 @@ TRIPTYCH_API int triptych_get_info(triptych *t, triptych_info *out);
 
 /* An open data set of a Gaussian scene. Lengths are in units of the scene. */
 typedef struct triptych_scene {
-    uint64_t gaussians, bricks; /* bricks of the three lists */
+    uint64_t gaussians, bricks; /* bricks of the three lists, all levels */
+    uint64_t coarse;            /* Gaussians of coarse levels, not in `gaussians` */
     uint64_t bytes;             /* of all files */
     int degree;                 /* of the spherical harmonics, 0 to 3 */
     int antialiased;            /* trained with opacities that make up for the blur of pixels */
     int flat;                   /* surfels: each has no thickness along one axis */
     int y_down;                 /* the scene's y axis points down */
     double lo[3], hi[3];        /* bounds of all centres */
-    /* Bounds of the centres without the outer 1 % on each side. Views fit these. */
+    /* Bounds of the centres without the outer 1 % on each side; if these are a point, bounds of the
+     * Gaussians. Views fit these. */
     double typical_lo[3], typical_hi[3];
     const char *notes; /* JSON; belongs to the data set */
 } triptych_scene;
@@ -542,7 +544,8 @@ typedef struct triptych_integral_settings {
 typedef struct triptych_lod_settings {
     /* Each part of the picture is drawn at the coarsest level with voxels at most this many pixels
      * wide, up to 1000. TRIPTYCH_ZERO draws the finest level only. By default (0 or -2), post
-     * chooses by the quality, and pre draws the finest level. */
+     * chooses by the quality, and pre draws the finest level. For Gaussian scenes the default is
+     * 1. */
     double voxel_px;
     /* Bounds the bytes of codes and normals in view. The parts that are widest in the picture get
      * the finest levels first. Positions are not counted; they add 10 to 30 %. Never finer than
@@ -644,7 +647,8 @@ typedef struct triptych_settings {
     triptych_interpolation interpolation;
     triptych_show show; /* not with the integral, which has no lists and no levels */
     /* Merge: weight at which layers begin to blend, 0 (TRIPTYCH_ZERO) to below 1. The default is
-     * 0.85 for pre and 0.99 for post. */
+     * 0.85 for pre and 0.99 for post. A scene drawn by depth has one layer, and refuses h and
+     * `method`. */
     double h;
     /* Transmittance below which a pixel takes no more samples or splats: 0 (TRIPTYCH_ZERO, never)
      * to 0.1. No component of a pixel changes by more than this number. The default is 1/8192 for

@@ -135,12 +135,11 @@ static inline double trip_gaussian_opacity(const trip_gaussian *g, const trip_ga
     return opacity;
 }
 
-/* Sets the shape and the opacity of a footprint from its position. Returns false if nothing of it
- * counts. */
-static inline bool trip_gaussian_project(const trip_camera *c, const trip_gaussian_settings *s,
-                                         const trip_gaussian *g, trip_gaussian_footprint *f)
+/* Sets the rows of J R diag(deviations). A limited J stays near the picture. */
+static inline void trip_gaussian_to_picture(const trip_camera *c, const trip_gaussian *g,
+                                            bool limited, const trip_gaussian_footprint *f,
+                                            trip_vec3 *a, trip_vec3 *b)
 {
-    const bool limited = s->shape == TRIP_GAUSSIAN_PROJECTED;
     trip_vec3 jx = c->to_x, jy = c->to_y;
     if (!c->ortho) {
         const double w = 0.5 * c->width, h = 0.5 * c->height, clamp = TRIP_GAUSSIAN_CLAMP;
@@ -150,8 +149,17 @@ static inline bool trip_gaussian_project(const trip_camera *c, const trip_gaussi
         jy = trip_scale(trip_sub(jy, trip_scale(c->forward, y)), 1 / f->z);
     }
     const trip_vec3 deviations = trip_gaussian_deviations(g);
-    const trip_vec3 a = trip_vec3_times(trip_gaussian_to_axes(g, jx), deviations);
-    const trip_vec3 b = trip_vec3_times(trip_gaussian_to_axes(g, jy), deviations);
+    *a = trip_vec3_times(trip_gaussian_to_axes(g, jx), deviations);
+    *b = trip_vec3_times(trip_gaussian_to_axes(g, jy), deviations);
+}
+
+/* Sets the shape and the opacity of a footprint from its position. Returns false if nothing of it
+ * counts. */
+static inline bool trip_gaussian_project(const trip_camera *c, const trip_gaussian_settings *s,
+                                         const trip_gaussian *g, trip_gaussian_footprint *f)
+{
+    trip_vec3 a, b;
+    trip_gaussian_to_picture(c, g, s->shape == TRIP_GAUSSIAN_PROJECTED, f, &a, &b);
     /* The determinant of a sum has no cancellation in this form. */
     const double xx = trip_dot(a, a), xy = trip_dot(a, b), yy = trip_dot(b, b);
     const double bare = trip_dot(trip_cross(a, b), trip_cross(a, b)), add = TRIP_GAUSSIAN_LOW_PASS;
@@ -172,20 +180,42 @@ static inline bool trip_gaussian_project(const trip_camera *c, const trip_gaussi
     return true;
 }
 
+/* Returns a footprint with the position of a Gaussian alone. */
+static inline trip_gaussian_footprint trip_gaussian_position(const trip_camera *c,
+                                                             const trip_gaussian *g)
+{
+    const trip_vec3 from_eye = trip_sub(trip_v3(g->centre[0], g->centre[1], g->centre[2]), c->eye);
+    const double z = trip_dot(c->forward, from_eye), by = c->ortho ? 1 : z;
+    return (trip_gaussian_footprint){ .x = trip_dot(c->to_x, from_eye) / by,
+                                      .y = trip_dot(c->to_y, from_eye) / by,
+                                      .z = z };
+}
+
 /* Computes the footprint of a Gaussian. Returns false if the Gaussian is not drawn, whether it
  * meets the picture or not. */
 static inline bool trip_gaussian_footprint_of(const trip_camera *c, const trip_gaussian_settings *s,
                                               const trip_gaussian *g, trip_gaussian_footprint *f)
 {
     const trip_vec3 centre = trip_v3(g->centre[0], g->centre[1], g->centre[2]);
-    const trip_vec3 from_eye = trip_sub(centre, c->eye);
     if (!trip_gaussian_is_drawn(c, s, centre))
         return false;
-    const double z = trip_dot(c->forward, from_eye), by = c->ortho ? 1 : z;
-    *f = (trip_gaussian_footprint){ .x = trip_dot(c->to_x, from_eye) / by,
-                                    .y = trip_dot(c->to_y, from_eye) / by,
-                                    .z = z };
+    *f = trip_gaussian_position(c, g);
     return trip_gaussian_project(c, s, g, f);
+}
+
+/* Returns the share of its opacity that a drawn Gaussian keeps, so that the low-pass filter does
+ * not change the light that it blocks. */
+static inline double trip_gaussian_compensation(const trip_camera *c, const trip_gaussian *g)
+{
+    const trip_gaussian_footprint f = trip_gaussian_position(c, g);
+    const double add = TRIP_GAUSSIAN_LOW_PASS;
+    trip_vec3 a, b;
+    if (!(f.z > 0))
+        return 1;
+    trip_gaussian_to_picture(c, g, true, &f, &a, &b);
+    const trip_vec3 cross = trip_cross(a, b);
+    const double bare = trip_dot(cross, cross);
+    return sqrt(bare / (bare + add * (trip_dot(a, a) + trip_dot(b, b)) + add * add));
 }
 
 /* Returns the squared radius q at d = (dx, dy) from the centre. */

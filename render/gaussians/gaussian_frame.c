@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "clock.h"
+#include "gaussian_footprint.h"
 #include "gaussians_cpu.h"
 #include "gaussians_reference.h"
 #include "normalise.h"
@@ -36,11 +37,12 @@ struct trip_gaussian_frame {
     layer layers[LAYERS_MAX];
     unsigned layer_count, drawn; /* layers; those that are complete */
     source sources[WAYS];
-    unsigned source_count; /* of the layer that is drawn; 0 until its streams are open */
-    trip_gaussian *batch;  /* in order, of all sources */
-    double stop;           /* the order by depth pauses at this key */
-    bool paused;           /* the next Gaussian has a key from `stop` on */
-    float *picture;        /* of one layer, with distances behind it; NULL for one layer */
+    unsigned source_count;  /* of the layer that is drawn; 0 until its streams are open */
+    uint64_t planned, seen; /* Gaussians in the streams of this layer; those drawn */
+    trip_gaussian *batch;   /* in order, of all sources */
+    double stop;            /* the order by depth pauses at this key */
+    bool paused;            /* the next Gaussian has a key from `stop` on */
+    float *picture;         /* of one layer, with distances behind it; NULL for one layer */
     trip_gaussian_frame_stats stats;
 };
 
@@ -191,6 +193,20 @@ static trip_gaussian_key key_of_depth(const trip_camera *c)
     return key;
 }
 
+/* A length covers the most pixels in the corners of the picture. */
+static trip_gaussian_lod lod_of(const trip_gaussian_frame *f)
+{
+    const trip_camera *c = f->params.camera;
+    const trip_gaussian_view v = view_of(c);
+    trip_gaussian_lod lod = { .voxel_px = f->params.lod_px,
+                              .eye = { v.eye[0], v.eye[1], v.eye[2] },
+                              .parallel = c->ortho,
+                              .px = c->height / (2 * v.half_height) };
+    if (!c->ortho)
+        lod.px *= sqrt(1 + v.half_width * v.half_width + v.half_height * v.half_height);
+    return lod;
+}
+
 static int open_stream(trip_gaussian_frame *f, const trip_gaussian_stream_params *params)
 {
     const trip_gaussian_frame_params *of = &f->params;
@@ -201,6 +217,9 @@ static int open_stream(trip_gaussian_frame *f, const trip_gaussian_stream_params
         return status;
     const trip_gaussian_plan *plan = trip_placed_stream_planned(*out);
     f->stats.bricks += plan->bricks;
+    f->planned += plan->records;
+    f->stats.planned += plan->records;
+    f->stats.coarse += plan->coarse_records;
     if (plan->window_records > f->stats.window_records)
         f->stats.window_records = plan->window_records;
     f->sources[f->source_count].at = f->sources[f->source_count].count = 0;
@@ -218,9 +237,11 @@ static int open_streams(trip_gaussian_frame *f, const layer *l)
         .axis = l->axis,
         .planes = planes,
         .plane_count = find_planes(c, planes),
+        .lod = lod_of(f),
         .degree = f->params.settings.degree,
     };
     f->source_count = 0;
+    f->planned = f->seen = 0;
     if (!f->params.by_lists) {
         p.key = key_of_depth(c);
         return open_stream(f, &p);
@@ -246,10 +267,25 @@ static void close_streams(trip_gaussian_frame *f)
     f->source_count = 0;
 }
 
-static int fill(source *s)
+/* A Gaussian of a coarse level blocks the same light as without the low-pass filter. Its opacity
+ * above 1/255 counts, since drawing leaves out the rest. */
+static void compensate(const trip_gaussian_frame *f, trip_gaussian *g)
+{
+    const trip_gaussian_settings *s = &f->params.settings;
+    const float least = (float)TRIP_GAUSSIAN_ALPHA_MIN;
+    if (g->merged && g->opacity > least && !s->antialiased && !g->antialiased &&
+        s->shape != TRIP_GAUSSIAN_EWA)
+        g->opacity =
+            least + (g->opacity - least) * (float)trip_gaussian_compensation(f->params.camera, g);
+}
+
+static int fill(const trip_gaussian_frame *f, source *s)
 {
     s->at = s->count = 0;
-    return trip_placed_stream_next(s->stream, s->batch, s->keys, BATCH, &s->count);
+    const int status = trip_placed_stream_next(s->stream, s->batch, s->keys, BATCH, &s->count);
+    for (size_t i = 0; i < s->count; i++)
+        compensate(f, &s->batch[i]);
+    return status;
 }
 
 static bool has_any(const source *s)
@@ -262,9 +298,9 @@ static int take_batch(trip_gaussian_frame *f, const trip_gaussian **batch, size_
 {
     const double begun = trip_now_ms();
     source *a = &f->sources[0], *b = &f->sources[1];
-    int status = has_any(a) ? 0 : fill(a);
+    int status = has_any(a) ? 0 : fill(f, a);
     if (!status && f->source_count > 1 && !has_any(b))
-        status = fill(b);
+        status = fill(f, b);
     if (status || f->source_count == 1) {
         const size_t first = a->at;
         while (!status && has_any(a) && a->keys[a->at] < f->stop)
@@ -313,6 +349,17 @@ int trip_gaussian_frame_begin(trip_gaussian_frame **out, const trip_gaussian_fra
     return status;
 }
 
+/* Two streams of a layer plan some bricks twice, and may leave out some of their Gaussians. */
+static double share_done(const trip_gaussian_frame *f)
+{
+    double all = 0;
+    for (unsigned i = 0; i < f->params.set_count; i++)
+        all += (double)f->params.sets[i].set->header.records;
+    const double planned = fmin((double)f->planned, all);
+    const double part = planned > 0 ? fmin((double)f->seen / planned, 1) : 0;
+    return (f->drawn + part) / f->layer_count;
+}
+
 /* Draws one batch. Opens the streams of the next layer once a layer is complete. */
 static int draw_batch(trip_gaussian_frame *f)
 {
@@ -329,12 +376,16 @@ static int draw_batch(trip_gaussian_frame *f)
         status = end_layer(l);
     f->stats.draw_ms += trip_now_ms() - begun;
     f->stats.gaussians += count;
+    f->seen += count;
+    f->stats.done = share_done(f);
     if (status || count || f->paused)
         return status;
     for (unsigned i = 0; i < f->source_count; i++)
         f->stats.bytes_read += trip_placed_stream_planned(f->sources[i].stream)->read_bytes;
     close_streams(f);
     f->drawn++;
+    f->planned = f->seen = 0;
+    f->stats.done = share_done(f);
     return 0;
 }
 

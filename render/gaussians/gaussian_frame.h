@@ -27,6 +27,8 @@ typedef struct trip_gaussian_frame_params {
     trip_gaussian_settings settings;
     /* For the order by lists: its method and h. NULL: by depth. */
     const trip_settings *by_lists;
+    /* Width in pixels of the voxels that coarse Gaussians may stand for; 0: none do. */
+    double lod_px;
     bool reference; /* draws in double precision, without threads */
     /* Composites in place of the CPU; NULL for none. It must outlive the frame. */
     const trip_tile_device *device;
@@ -36,9 +38,12 @@ typedef struct trip_gaussian_frame_params {
 
 typedef struct trip_gaussian_frame_stats {
     uint64_t gaussians; /* drawn from the streams, over all layers */
+    uint64_t planned;   /* in the plans of the streams */
+    uint64_t coarse;    /* in the plans, of coarse levels */
     uint64_t bricks, bytes_read;
     uint64_t window_records; /* room in the largest window */
     unsigned layers;
+    double done; /* share of the frame, 0 to 1 */
     double draw_ms, read_ms, merge_ms;
 } trip_gaussian_frame_stats;
 

@@ -53,6 +53,23 @@ static void place(const trip_gaussian_transform *t, const double from[3], double
     }
 }
 
+/* Moves the eye of levels of detail into the set's space. Only parallel views have pixels of a
+ * length. */
+static void place_lod(trip_gaussian_lod *lod, const trip_gaussian_transform *t)
+{
+    double from[3], eye[3] = { 0 };
+    if (t->identity)
+        return;
+    for (int i = 0; i < 3; i++)
+        from[i] = lod->eye[i] - t->m[i][3];
+    for (int k = 0; k < 3; k++)
+        for (int i = 0; i < 3; i++)
+            eye[k] += t->m[i][k] * from[i] / (t->scale * t->scale);
+    memcpy(lod->eye, eye, sizeof eye);
+    if (lod->parallel)
+        lod->px *= t->scale;
+}
+
 static void place_params(part *p, const trip_gaussian_transform *t,
                          const trip_gaussian_stream_params *from)
 {
@@ -64,6 +81,7 @@ static void place_params(part *p, const trip_gaussian_transform *t,
         p->planes[i].reach = t->identity ? plane->reach : plane->reach * t->scale;
     }
     p->params.planes = p->planes;
+    place_lod(&p->params.lod, t);
     /* The list whose order is nearest to the order along the common axis. */
     const double *row = t->m[from->axis];
     for (int a = 0; a < 3; a++)
@@ -101,6 +119,7 @@ static void add_plan(trip_gaussian_plan *sum, const trip_gaussian_plan *p)
 {
     sum->bricks += p->bricks;
     sum->records += p->records;
+    sum->coarse_records += p->coarse_records;
     sum->read_bytes += p->read_bytes;
 }
 

@@ -52,6 +52,14 @@ def many(count, spread=1.0, seed=1, degree=0):
         r.uniform(-4.5, -2.5, (count, 3)) + math.log(spread), r.normal(0, 1, (count, 4))])
 
 
+def orders():
+    """Returns the names that --order takes, by the line that refuses another one."""
+    said = program.call("render", "x.trip", "-o", "x.png", "--order=nonsense").stderr
+    names = said.strip().rpartition("use one of ")[2].split(", ")
+    assert names[:2] == ["depth", "lists"], said
+    return names
+
+
 def options_of(view):
     """Returns the options of a view of definition.py."""
     out = ["--eye", ",".join(map(repr, map(float, view["eye"]))),
@@ -259,15 +267,109 @@ class Gaussians(program.ProgramTest):
             self.assertGreater(one[:, :, 3].max(), 0.4)
             self.assertLess(255 * numpy.abs(cut - one).max(), 1, order)
 
+    # ---- palette ----
+
+    def test_a_palette_keeps_the_picture_of_a_scene_that_fits_into_it(self):
+        ply = os.path.join(program.DATASETS, "train-1000.ply")
+        rows = many(3000, degree=3)
+        write_scene("fits.ply", rows, 3)
+        for path in ply, "fits.ply":
+            sizes, pictures = [], []
+            for how in "auto", "palette", "whole":
+                run = self.works("brick", path, "-o", "p.trip", "--force", "--json", "--harmonics", how)
+                made = json.loads(run.stdout)
+                sizes.append(made["bytes"])
+                self.assertEqual(made["palette_entries"] > 0, how != "whole")
+                self.assertLess(255 * made["palette_error"], 0.4)
+                self.works("info", "--verify", "p.trip")
+                pictures.append([self.picture("p.trip", "--size", "90", "--azimuth", a, "--sh", sh)
+                                 for a in (0, 130) for sh in (1, 3)])
+            self.assertLess(sizes[1], 0.7 * sizes[2])
+            self.assertEqual(sizes[0], sizes[1])
+            apart = 255 * numpy.abs(numpy.array(pictures[1]) - pictures[2])
+            self.assertLess(apart.mean(), 0.05)
+            self.assertLess(apart.max(), 2)
+
+    def test_the_palette_states_the_error_of_colours(self):
+        """100000 sets without any likeness do not fit, so auto keeps them whole. Noise of 0.2 has the
+        mean square 0.2^2 * 15 / (4 pi) over all directions, of which a palette keeps the most."""
+        write_scene("unlike.ply", many(100000, degree=3), 3)
+        stated = {}
+        for how in "auto", "palette":
+            run = self.works("brick", "unlike.ply", "-o", how + ".trip", "--force", "--json",
+                             "--harmonics", how)
+            stated[how] = json.loads(run.stdout)
+        self.assertEqual(stated["auto"]["palette_entries"], 0)
+        self.assertEqual(stated["palette"]["palette_entries"], 65536)
+        error = 255 * stated["palette"]["palette_error"]
+        noise = 255 * 0.2 * math.sqrt(15 / (4 * math.pi))
+        self.assertGreater(error, noise / 4)
+        self.assertLess(error, 1.5 * noise)
+        whole, palette = (self.picture(how + ".trip", "--size", "90") for how in ("auto", "palette"))
+        # A pixel mixes Gaussians, so it changes less than their colours.
+        self.assertLess(255 * numpy.abs(whole - palette)[:, :, :3].mean(), error)
+
+    # ---- levels ----
+
+    def test_a_far_scene_has_the_mean_of_its_picture(self):
+        """Many rays per pixel show the mean. Each pixel of the far picture sees many Gaussians."""
+        rows = numpy.array(many(60000))
+        rows[:, 7:10] = math.log(0.012)
+        rows[:, 6] = math.log(0.06 / 0.94)  # opacity 0.06
+        data = self.scene("distant", rows)
+        for view in view_of((20, -9, 30), size=(20, 20), fov=6), \
+                view_of((20, -9, 30), size=(20, 20), ortho_height=4):
+            mean = self.picture(data, *options_of(view), "--lod", "0", "--samples", "32")
+            for options in (), ("--order", "lists"), ("--renderer", "reference"):
+                fine = self.picture(data, *options_of(view), "--lod", "0", *options)
+                coarse = self.picture(data, *options_of(view), "--lod", "1", *options)
+                apart = [255 * numpy.abs(p - mean).mean() for p in (fine, coarse)]
+                self.assertLess(apart[1], 0.25 * apart[0], options)
+                self.assertLess(apart[1], 3, options)
+                self.assertAlmostEqual(coarse[:, :, 3].mean(), mean[:, :, 3].mean(), delta=0.01)
+            drawn = [self.stats(data, *options_of(view), "--lod", lod)["frames"][0] for lod in (0, 1)]
+            self.assertLess(3 * drawn[1]["gaussians"], drawn[0]["gaussians"])
+            self.assertLess(3 * drawn[1]["bytes_read"], drawn[0]["bytes_read"])
+
+    def test_a_near_view_has_the_same_bits_with_levels(self):
+        data = self.scene("close", many(60000))
+        view = options_of(view_of((2.4, -0.9, 3), size=(200, 150)))
+        fine = self.picture(data, *view, "--lod", "0")
+        for options in (), ("--lod", "auto"), ("--lod", "1"):
+            self.assertTrue((fine == self.picture(data, *view, *options)).all())
+        self.assertFalse((fine == self.picture(data, *view, "--lod", "100")).all())
+
+    def test_samples_make_the_pixels_of_levels_smaller(self):
+        data = self.scene("sampled", many(60000))
+        view = options_of(view_of((8, -3, 14), size=(20, 20), fov=20))
+        drawn = [self.stats(data, *view, *options)["frames"][0]["gaussians"] for options in
+                 (("--lod", "1"), ("--lod", "1", "--samples", "8"), ("--lod", "0"))]
+        self.assertLess(drawn[0], drawn[2])
+        self.assertEqual(drawn[0], drawn[1])
+
+    def test_no_frame_jumps_while_the_eye_moves_away(self):
+        """Two frames 1 % apart differ by at most twice as much as without levels."""
+        data = self.scene("zoom", many(60000))
+        jumps = []
+        for lod in "0", "1":
+            frames, distance = [], 17.0
+            while distance < 26:
+                view = view_of((0.6 * distance, -0.3 * distance, 0.74 * distance), size=(80, 80), fov=30)
+                frames.append(self.picture(data, *options_of(view), "--lod", lod))
+                distance *= 1.01
+            jumps.append(max(255 * numpy.abs(a - b).mean() for a, b in zip(frames, frames[1:])))
+        self.assertLess(jumps[1], 2 * jumps[0])
+
     # ---- runs ----
 
     def test_threads_and_memory_change_no_bit(self):
-        data = self.scene("bits", many(20000))
+        data = self.scene("bits", many(60000))
         for order in "depth", "lists":
-            pictures = [self.picture(data, "--size", "150x130", "--order", order, *o)
-                        for o in ((), ("--threads", "1"), ("--threads", "5"), ("--memory", "60M"))]
-            for other in pictures[1:]:
-                self.assertTrue((pictures[0] == other).all(), order)
+            for lod in "0", "60":
+                pictures = [self.picture(data, "--size", "150x130", "--order", order, "--lod", lod, *o)
+                            for o in ((), ("--threads", "1"), ("--threads", "5"), ("--memory", "60M"))]
+                for other in pictures[1:]:
+                    self.assertTrue((pictures[0] == other).all(), order)
 
     def test_two_runs_of_brick_give_the_same_bytes(self):
         write_scene("twice.ply", many(5000))
@@ -385,13 +487,21 @@ class Gaussians(program.ProgramTest):
             file.write(bytes([byte[0] ^ 1]))
         self.fails(1, "info", "--verify", data)
 
+    def test_bench_flies_through_a_scene(self):
+        data = self.scene("flown", many(300))
+        report = json.loads(self.works("bench", "flight", data, "--seconds", "0.4", "--size", "90x60", "--json").stdout)
+        self.assertEqual(report["settings"]["gaussians"], 300)
+        rest, = report["tables"]["rest"]["rows"]
+        self.assertEqual(rest["differ"], 0)
+        self.assertGreater(rest["first_ms"], 0)
+        self.fails(2, "bench", "flight", data, "--tf", "bone", "--seconds", "0.1")
+
     # ---- refusals ----
 
     def test_commands_for_volumes_refuse_scenes(self):
         data = self.scene("refused", [row((0, 0, 0))])
         for name in data, "refused.ply":
-            for command in ("view", name), ("serve", name), ("accuracy", name, "-o", "r"), \
-                           ("bench", "stream", name):
+            for command in ("accuracy", name, "-o", "r"), ("bench", "stream", name):
                 self.leaves_nothing(2, *command,
                                     says=f"{name}: is a Gaussian scene; `triptych render` draws it")
         self.works("render", data, data, "-o", "a.png")
@@ -400,12 +510,23 @@ class Gaussians(program.ProgramTest):
 
     def test_settings_of_volumes_are_refused_for_scenes(self):
         data = self.scene("settings", [row((0, 0, 0))])
-        for options in ("--lod", "1"), ("--interpolation", "cubic"), ("--compositing", "sheet"), \
+        for options in ("--max-bytes", "1M"), ("--interpolation", "cubic"), ("--compositing", "sheet"), \
                        ("--error", "1"), ("--kernel", "fixed"), ("--tf", "bone"), \
                        ("--effects", "shadows"), ("--renderer", "integral"):
             self.leaves_nothing(2, "render", data, "-o", "a.png", *options)
+        tooth = os.path.join(program.DATASETS, "tooth.nhdr")
+        self.leaves_nothing(2, "brick", tooth, "-o", "b.trip", "--harmonics", "whole",
+                            says="apply to Gaussian scenes only")
         self.leaves_nothing(2, "render", "settings.ply", "-o", "a.png", "--spacing", "1,1,1",
                             says="does not apply to Gaussian scenes")
+        for options, says in ((["--clip-box", "voxels:0,0,0,1,1,1"], "--clip-box: voxels: does not apply"),
+                              (["--h", "0.5"], "--h: does not apply to scenes with --order depth"),
+                              (["--method", "clip", "--order", "depth"], "--method: does not apply to scenes"),
+                              (["--engine", "null"], "--engine: must be pread"),
+                              (["--engine", "io_uring"], "--engine: must be pread"),
+                              (["--occluded", "draw"], "--occluded: does not apply")):
+            for name in data, "settings.ply":
+                self.leaves_nothing(2, "render", name, "-o", "a.png", *options, says=says)
 
     def test_settings_of_scenes_are_refused_for_volumes(self):
         tooth = os.path.join(program.DATASETS, "tooth.nhdr")

@@ -80,12 +80,12 @@ VIEWS = (view_of((0, 0, 30), (0, 0, 4), (0, 1, 0), (48, 32), 8),
 
 
 class Mixed(program.ProgramTest):
-    def assert_picture(self, wanted, bound, *arguments):
-        """Compares a picture, all of whose rays meet the fog, with the expected one. In 1/255. The data set
-        rounds its numbers, so an alpha near 1/255 may count or not."""
-        apart = 255 * abs(self.picture(*arguments, *CLEAR) - wanted)
-        self.assertLess(apart.max(), bound, arguments)
-        self.assertLess(apart.mean(), 0.01, arguments)
+    def assert_picture(self, wanted, *arguments):
+        """Compares a picture, all of whose rays meet the fog, with the expected one, in 1/255. The data set
+        rounds its numbers. So a few pixels with an alpha near 1/255 may count it or not."""
+        apart = numpy.sort(255 * abs(self.picture(*arguments, *CLEAR) - wanted).max(axis=2).ravel())
+        self.assertLess(apart[-1], 1, arguments)
+        self.assertLess(apart[-5], 0.05, arguments)
 
     def test_gaussians_before_inside_and_behind_fog(self):
         write_fog("fog", WHITE)
@@ -95,7 +95,7 @@ class Mixed(program.ProgramTest):
             for view in VIEWS:
                 wanted = expected(view, rows, WHITE)
                 for renderer in "cpu", "reference", "integral", *program.GL:
-                    self.assert_picture(wanted, 0.5, "a.json", *options_of(view), "--renderer", renderer)
+                    self.assert_picture(wanted, "a.json", *options_of(view), "--renderer", renderer)
 
     def test_the_order_of_objects_does_not_matter(self):
         write_fog("fog", DENSE)
@@ -104,7 +104,7 @@ class Mixed(program.ProgramTest):
         objects = fog_object("fog"), {"data": "splats.ply"}
         for path, order in ("a.json", objects), ("b.json", objects[::-1]):
             write_objects(path, *order)
-            self.assert_picture(wanted, 0.5, path, *options_of(VIEWS[0]))
+            self.assert_picture(wanted, path, *options_of(VIEWS[0]))
 
     def test_fogs_in_the_same_place_add_up(self):
         write_fog("fog", WHITE)
@@ -113,8 +113,8 @@ class Mixed(program.ProgramTest):
         write_objects("a.json", fog_object("fog"), {"data": "splats.ply"}, fog_object("green"))
         write_objects("b.json", fog_object("fog"), fog_object("green"))
         for view in VIEWS:
-            self.assert_picture(expected(view, SPLATS, WHITE, GREEN), 0.5, "a.json", *options_of(view))
-            self.assert_picture(expected(view, [], WHITE, GREEN), 0.5, "b.json", *options_of(view))
+            self.assert_picture(expected(view, SPLATS, WHITE, GREEN), "a.json", *options_of(view))
+            self.assert_picture(expected(view, [], WHITE, GREEN), "b.json", *options_of(view))
 
     def test_fog_in_front_hides_fog_behind(self):
         write_fog("fog", WHITE)
@@ -124,7 +124,7 @@ class Mixed(program.ProgramTest):
         wanted = over(fog_between(view, 100, -100, WHITE), fog_between(view, 100, -100, DENSE))
         for path, names in ("a.json", "ab"), ("b.json", "ba"):
             write_objects(path, *(there[name] for name in names))
-            self.assert_picture(wanted, 0.5, path, "--ortho=3", "--eye=0,0,60", "--look=0,0,4", "--up=0,1,0",
+            self.assert_picture(wanted, path, "--ortho=3", "--eye=0,0,60", "--look=0,0,4", "--up=0,1,0",
                                 "--size=48x32")
 
     def test_a_turned_volume_meets_gaussians_where_it_stands(self):
@@ -134,15 +134,15 @@ class Mixed(program.ProgramTest):
         # (x, y, z) -> (x, -z, y): the cube from (-4, -4, 0) on needs the z of its y, and the y of its z
         write_objects("a.json", fog_object("fog", (-4, 4, 0), rotate={"axis": [1, 0, 0], "degrees": 90}),
                       {"data": "splats.ply"})
-        self.assert_picture(expected(VIEWS[0], SPLATS, WHITE), 0.5, "a.json", *options_of(VIEWS[0]))
+        self.assert_picture(expected(VIEWS[0], SPLATS, WHITE), "a.json", *options_of(VIEWS[0]))
 
     def test_place_does_what_a_scene_file_does(self):
         write_fog("fog", WHITE)
         write_scene("splats.ply", SPLATS)
         self.works("brick", "fog.nrrd", "--tf", "fog.tf", "-o", "fog.trip", "-q", "--force")
         by = "fog.trip", "splats.ply", "--tf", "fog.tf", *options_of(VIEWS[0])
-        self.assert_picture(expected(VIEWS[0], SPLATS, WHITE), 0.5, *by, "--place", "-4,-4,0,0.5")
-        self.assert_picture(expected(VIEWS[0], SPLATS, WHITE), 0.5, *by, "--place", "-4,-4,0,0.5;0,0,0")
+        self.assert_picture(expected(VIEWS[0], SPLATS, WHITE), *by, "--place", "-4,-4,0,0.5")
+        self.assert_picture(expected(VIEWS[0], SPLATS, WHITE), *by, "--place", "-4,-4,0,0.5;0,0,0")
         for bad in "1,2", "1,2,3,0", "1,2,3,-1", "x", "1,2,nan", "1,2,3;;4,5,6", "1,2,3,4,5":
             self.leaves_nothing(2, *("render", *by, "-o", "a.png"), "--place", bad, says="--place")
 

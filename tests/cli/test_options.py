@@ -42,6 +42,7 @@ BRICK = {
     "--code-bits": ["", "12", "0", "byte"],
     "--normals": ["", "nonsense", "3"],
     "--halo": ["", "2", "-1", "yes"],
+    "--harmonics": NAMES + ["exact"],
     "--levels": ["", "-1", "25", "1.5", "yes"],
     "--levels-for": NAMES + ["means"],
     "--resume": None,
