@@ -22,7 +22,6 @@ typedef struct volume {
     trip_view_object object;    /* placed in world space */
     trip_depth_range depths;    /* in the begun frame */
     triptych_frame_stats drawn; /* over the slabs of the begun frame */
-    unsigned slabs;
 } volume;
 
 struct trip_mixed {
@@ -344,7 +343,6 @@ int trip_context_begin_mixed(triptych *t, int side)
             status = use_view(t, v, side);
         v->depths = depths[i] = trip_mixture_depths(&t->camera, v->object.lo, v->object.hi);
         v->drawn = (triptych_frame_stats){ 0 };
-        v->slabs = 0;
     }
     if (status)
         return status;
@@ -391,7 +389,6 @@ static void note_stats(volume *v)
     v->drawn.splats += before.splats;
     v->drawn.bytes_read += before.bytes_read;
     v->drawn.reads += before.reads;
-    v->slabs++;
 }
 
 /* Draws the next volume of the slab, if it reaches into it. */
@@ -467,6 +464,7 @@ void trip_context_end_mixed(triptych *t)
     m->picture = m->distances = NULL;
 }
 
+/* The number of splats stays the number of Gaussians. */
 void trip_context_add_mixed_stats(const triptych *t, triptych_frame_stats *stats)
 {
     for (unsigned i = 0; i < t->mixed->count; i++) {
@@ -474,7 +472,6 @@ void trip_context_add_mixed_stats(const triptych *t, triptych_frame_stats *stats
         stats->wait_ms += s->wait_ms;
         stats->draw_ms += s->draw_ms;
         stats->merge_ms += s->merge_ms;
-        stats->splats += s->splats;
         stats->bytes_read += s->bytes_read;
         stats->reads += s->reads;
         stats->memory_bytes += s->memory_bytes;
