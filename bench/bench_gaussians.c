@@ -141,7 +141,7 @@ static int measure_orders(triptych *t, const bench_options *o, float *rgba, benc
 /* ---- a sort in each frame ---- */
 
 typedef struct sorted_scene {
-    const trip_gaussian_set *set;
+    trip_gaussian_set *set;
     const trip_camera *camera;
     trip_gaussian_settings settings;
     trip_settings weights;
@@ -260,8 +260,12 @@ static int draw_presorted(const sorted_scene *s, bool lists, float *rgba, double
 {
     const double begun = trip_now_ms();
     trip_gaussian_frame *f;
+    trip_placed_set placed = { .set = s->set };
+    static const double unmoved[3][4] = { { 1, 0, 0, 0 }, { 0, 1, 0, 0 }, { 0, 0, 1, 0 } };
+    trip_gaussian_transform_make(&placed.placement, unmoved);
     const trip_gaussian_frame_params params = {
-        .set = s->set,
+        .sets = &placed,
+        .set_count = 1,
         .camera = s->camera,
         .settings = s->settings,
         .by_lists = lists ? &s->weights : NULL,

@@ -558,6 +558,8 @@ static int run(options *o)
     if (scene == 2)
         status = trip_fail(TRIP_USAGE, "usage", o->volume,
                            "is a data set already; `triptych render` draws it");
+    if (!status && !scene && triptych_is_scene_file(o->volume))
+        status = library_fail_scene(o->volume);
     if (!status)
         status = scene ? brick_scene(t, o) : o->dry_run ? dry_run(t, o) : brick(t, o);
     trip_progress_end(&progress);

@@ -72,6 +72,17 @@ int library_check_scene_options(const triptych_brick_options *options)
     return 0;
 }
 
+bool library_is_scene(triptych *t, const char *input)
+{
+    return triptych_is_scene_file(input) || triptych_is_gaussians(t, input);
+}
+
+int library_fail_scene(const char *input)
+{
+    return trip_fail(TRIP_USAGE, "usage", input, "is a %s; `triptych render` draws it",
+                     triptych_is_scene_file(input) ? "scene file" : "Gaussian scene");
+}
+
 int library_check_kind(triptych *t, const char *input, const draw_settings *settings,
                        const triptych_resources *resources,
                        const triptych_transfer_function *function)

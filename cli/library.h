@@ -26,6 +26,10 @@ int library_check_kind(triptych *t, const char *input, const draw_settings *sett
 int library_fail_scene_option(const char *name);
 /* Fails if options for reading a volume were given for a Gaussian scene. */
 int library_check_scene_options(const triptych_brick_options *options);
+/* Whether an input is a Gaussian scene, or a scene file. */
+bool library_is_scene(triptych *t, const char *input);
+/* Fails: a command that needs volumes got such an input. */
+int library_fail_scene(const char *input);
 
 /* Switches the messages of the context off or on. */
 void library_hush(triptych *t, bool quiet);

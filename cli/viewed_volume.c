@@ -67,6 +67,8 @@ static int check_volume(const viewed_volume *s, triptych *t, const char *volume)
 int viewed_volume_check(const viewed_volume *s, triptych *t, const char *input,
                         const triptych_resources *resources)
 {
+    if (triptych_is_scene_file(input))
+        return library_fail_scene(input);
     const triptych_transfer_function function = { .name = s->function };
     const bool is_scene = triptych_is_gaussians(t, input) != 0;
     int status = library_check_kind(t, input, s->settings, resources, &function);

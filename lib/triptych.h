@@ -228,8 +228,48 @@ typedef struct triptych_scene {
  * fail with TRIPTYCH_USAGE: triptych_get_info(), triptych_get_list(), triptych_add(), and those
  * about values, heat and probes. */
 TRIPTYCH_API int triptych_is_scene(const triptych *t);
-/* Describes the open scene. Fails with TRIPTYCH_USAGE if a volume or nothing is open. */
+/* Describes the open scene. Fails with TRIPTYCH_USAGE if a volume or nothing is open. For several
+ * scenes in one picture, it sums the counts and joins the bounds, and gives the first scene's
+ * notes.
+ */
 TRIPTYCH_API int triptych_get_scene(triptych *t, triptych_scene *out);
+
+/* ---- several data sets in one picture ---- */
+
+enum { TRIPTYCH_OBJECTS_MAX = 1000 };
+
+/* A data set and its place in the picture. */
+typedef struct triptych_object {
+    const char *path;     /* of the data set */
+    const char *name;     /* in messages; NULL: the path */
+    double matrix[3][4];  /* maps the data set's space into the common space */
+    const char *function; /* file or preset of a volume; NULL: the function of the picture */
+} triptych_object;
+
+/* The matrix of an object that stays where it is. */
+#define TRIPTYCH_UNPLACED                                                                          \
+    {                                                                                              \
+        { 1, 0, 0, 0 }, { 0, 1, 0, 0 },                                                            \
+        {                                                                                          \
+            0, 0, 1, 0                                                                             \
+        }                                                                                          \
+    }
+
+/* Opens Gaussian scenes and at most 16 volumes for one picture, instead of triptych_open(). A
+ * matrix may move, turn and scale evenly. One path may occur several times, and is opened once. */
+TRIPTYCH_API int triptych_open_objects(triptych *t, const triptych_object *objects, unsigned count,
+                                       const triptych_resources *resources);
+/* Returns the number of scenes of the open picture: 0 if a volume or nothing is open. Sets *drawn
+ * to the Gaussians of each that the last frame drew; they last until the next frame. */
+TRIPTYCH_API unsigned triptych_get_objects(const triptych *t, const uint64_t **drawn);
+
+/* Returns 1 if the path names a scene file: a JSON file that places data sets. */
+TRIPTYCH_API int triptych_is_scene_file(const char *path);
+/* Reads a scene file. The path of an object is a named file, which may still need bricking. The
+ * `name` of an object is NULL. triptych_free_objects() frees the objects. */
+TRIPTYCH_API int triptych_read_scene_file(triptych *t, const char *path, triptych_object **objects,
+                                          unsigned *count);
+TRIPTYCH_API void triptych_free_objects(triptych_object *objects, unsigned count);
 
 /* A list: records of one kind along one axis at one level of detail. */
 typedef struct triptych_list {

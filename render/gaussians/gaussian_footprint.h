@@ -179,7 +179,7 @@ static inline bool trip_gaussian_project(const trip_camera *c, const trip_gaussi
     double opacity = trip_gaussian_opacity(g, s);
     if (s->shape == TRIP_GAUSSIAN_EWA)
         opacity *= sqrt(bare / filtered);
-    else if (s->antialiased)
+    else if (s->antialiased || g->antialiased)
         opacity *= sqrt(fmax(TRIP_GAUSSIAN_COMPENSATION_MIN, bare / filtered));
     if (!trip_gaussian_set_opacity(f, opacity))
         return false;

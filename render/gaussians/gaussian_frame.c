@@ -20,7 +20,7 @@ enum { BATCH = 1024, LAYERS_MAX = 3, WAYS = 2 };
 
 /* One stream and its next Gaussians. */
 typedef struct source {
-    trip_gaussian_stream *stream;
+    trip_placed_stream *stream;
     trip_gaussian *batch;
     double *keys;
     size_t at, count;
@@ -46,6 +46,8 @@ struct trip_gaussian_frame {
     unsigned source_count;  /* of the layer that is drawn; 0 until its streams are open */
     uint64_t planned, seen; /* Gaussians in the streams of this layer; those drawn */
     trip_gaussian *batch;   /* in order, of all sources */
+    double stop;            /* the order by depth pauses at this key */
+    bool paused;            /* the next Gaussian has a key from `stop` on */
     float *picture;         /* of one layer, with distances behind it; NULL for one layer */
     trip_gaussian_frame_stats stats;
 };
@@ -143,11 +145,13 @@ static int take_layer(const layer *l, float *rgba, float *depth)
 
 static int open_stream(trip_gaussian_frame *f, const trip_gaussian_stream_params *params)
 {
-    trip_gaussian_stream **out = &f->sources[f->source_count].stream;
-    int status = trip_gaussian_stream_open(out, f->params.set, params, f->params.budget);
+    const trip_gaussian_frame_params *of = &f->params;
+    trip_placed_stream **out = &f->sources[f->source_count].stream;
+    int status =
+        trip_placed_stream_open(out, of->sets, of->set_count, params, of->drawn, of->budget);
     if (status)
         return status;
-    const trip_gaussian_plan *plan = trip_gaussian_stream_planned(*out);
+    const trip_gaussian_plan *plan = trip_placed_stream_planned(*out);
     f->stats.bricks += plan->bricks;
     f->planned += plan->records;
     f->stats.planned += plan->records;
@@ -194,7 +198,7 @@ static int open_streams(trip_gaussian_frame *f, const layer *l)
 static void close_streams(trip_gaussian_frame *f)
 {
     for (int i = 0; i < WAYS; i++) {
-        trip_gaussian_stream_close(f->sources[i].stream);
+        trip_placed_stream_close(f->sources[i].stream);
         f->sources[i].stream = NULL;
     }
     f->source_count = 0;
@@ -206,7 +210,8 @@ static void compensate(const trip_gaussian_frame *f, trip_gaussian *g)
 {
     const trip_gaussian_settings *s = &f->params.settings;
     const float least = (float)TRIP_GAUSSIAN_ALPHA_MIN;
-    if (g->merged && g->opacity > least && !s->antialiased && s->shape != TRIP_GAUSSIAN_EWA)
+    if (g->merged && g->opacity > least && !s->antialiased && !g->antialiased &&
+        s->shape != TRIP_GAUSSIAN_EWA)
         g->opacity =
             least + (g->opacity - least) * (float)trip_gaussian_compensation(f->params.camera, g);
 }
@@ -214,7 +219,7 @@ static void compensate(const trip_gaussian_frame *f, trip_gaussian *g)
 static int fill(const trip_gaussian_frame *f, source *s)
 {
     s->at = s->count = 0;
-    const int status = trip_gaussian_stream_next(s->stream, s->batch, s->keys, BATCH, &s->count);
+    const int status = trip_placed_stream_next(s->stream, s->batch, s->keys, BATCH, &s->count);
     for (size_t i = 0; i < s->count; i++)
         compensate(f, &s->batch[i]);
     return status;
@@ -234,9 +239,12 @@ static int take_batch(trip_gaussian_frame *f, const trip_gaussian **batch, size_
     if (!status && f->source_count > 1 && !has_any(b))
         status = fill(f, b);
     if (status || f->source_count == 1) {
-        *batch = a->batch;
-        *count = status ? 0 : a->count;
-        a->at = a->count;
+        const size_t first = a->at;
+        while (!status && has_any(a) && a->keys[a->at] < f->stop)
+            a->at++;
+        *batch = a->batch + first;
+        *count = a->at - first;
+        f->paused = !status && !*count && has_any(a);
     } else {
         *batch = f->batch;
         *count = 0;
@@ -257,7 +265,9 @@ static int begin_integral(trip_gaussian_frame *f)
 {
     const trip_gaussian_frame_params *p = &f->params;
     return trip_gaussian_integral_begin(&f->integral, &(trip_gaussian_integral_params){
-                                                          .set = p->set,
+                                                          .sets = p->sets,
+                                                          .set_count = p->set_count,
+                                                          .drawn = p->drawn,
                                                           .camera = p->camera,
                                                           .settings = p->settings,
                                                           .tolerance = p->tolerance,
@@ -286,7 +296,7 @@ static int begin_sheets(trip_gaussian_frame *f)
 {
     const trip_gaussian_frame_params *p = &f->params;
     return trip_gaussian_sheet_frame_begin(&f->sheets, &(trip_gaussian_sheet_frame_params){
-                                                           .set = p->set,
+                                                           .set = p->sets->set,
                                                            .camera = p->camera,
                                                            .settings = p->settings,
                                                            .weights = &f->weights,
@@ -350,7 +360,9 @@ int trip_gaussian_frame_begin(trip_gaussian_frame **out, const trip_gaussian_fra
 /* Two streams of a layer plan some bricks twice, and may leave out some of their Gaussians. */
 static double share_done(const trip_gaussian_frame *f)
 {
-    const double all = (double)f->params.set->header.records;
+    double all = 0;
+    for (unsigned i = 0; i < f->params.set_count; i++)
+        all += (double)f->params.sets[i].set->header.records;
     const double planned = fmin((double)f->planned, all);
     const double part = planned > 0 ? fmin((double)f->seen / planned, 1) : 0;
     return (f->drawn + part) / f->layer_count;
@@ -374,10 +386,10 @@ static int draw_batch(trip_gaussian_frame *f)
     f->stats.gaussians += count;
     f->seen += count;
     f->stats.done = share_done(f);
-    if (status || count)
+    if (status || count || f->paused)
         return status;
     for (unsigned i = 0; i < f->source_count; i++)
-        f->stats.bytes_read += trip_gaussian_stream_planned(f->sources[i].stream)->read_bytes;
+        f->stats.bytes_read += trip_placed_stream_planned(f->sources[i].stream)->read_bytes;
     close_streams(f);
     f->drawn++;
     f->planned = f->seen = 0;
@@ -385,21 +397,28 @@ static int draw_batch(trip_gaussian_frame *f)
     return 0;
 }
 
-int trip_gaussian_frame_step(trip_gaussian_frame *f, uint64_t deadline_ns)
+int trip_gaussian_frame_step_to(trip_gaussian_frame *f, double depth, uint64_t deadline_ns)
 {
     int status = 0;
     if (f->integral)
         return trip_gaussian_integral_step(f->integral, deadline_ns);
     if (f->sheets)
         return trip_gaussian_sheet_frame_step(f->sheets, deadline_ns);
-    while (!status && f->drawn < f->layer_count) {
+    f->stop = depth;
+    f->paused = false;
+    while (!status && f->drawn < f->layer_count && !f->paused) {
         status = draw_batch(f);
         if (!status)
             status = trip_frame_poll();
-        if (!status && f->drawn < f->layer_count && trip_now_ns() >= deadline_ns)
+        if (!status && f->drawn < f->layer_count && !f->paused && trip_now_ns() >= deadline_ns)
             return TRIP_FRAME_MORE;
     }
     return status ? status : TRIP_FRAME_DONE;
+}
+
+int trip_gaussian_frame_step(trip_gaussian_frame *f, uint64_t deadline_ns)
+{
+    return trip_gaussian_frame_step_to(f, INFINITY, deadline_ns);
 }
 
 /* Adds w^2 times a layer to the sums. Distances are weighted by opacity too, as in layer.h. */

@@ -1,5 +1,5 @@
-/* Draws one picture of a Gaussian scene, in steps: streams its Gaussians in the order of drawing,
- * composites them into layers, and merges the layers.
+/* Draws one picture of placed Gaussian scenes, in steps: streams their Gaussians in the order of
+ * drawing, composites them into layers, and merges the layers.
  *
  * - The order by depth has one layer. Its Gaussians come in the order of the centres' view depth.
  * - The order by lists has a layer for each axis with weight in the picture. Its Gaussians come in
@@ -13,17 +13,19 @@
 #define TRIP_GAUSSIAN_FRAME_H
 
 #include "gaussian_picture.h"
-#include "gaussian_stream.h"
 #include "gaussian_tiles.h"
+#include "placed_stream.h"
 #include "settings.h"
 #include "task_runner.h"
 
 typedef struct trip_gaussian_frame trip_gaussian_frame;
 
-/* The set and the camera must outlive the frame. */
+/* The sets and the camera must outlive the frame. */
 typedef struct trip_gaussian_frame_params {
-    const trip_gaussian_set *set;
-    const trip_camera *camera; /* index space is the scene's space */
+    const trip_placed_set *sets;
+    unsigned set_count;
+    uint64_t *drawn;           /* Gaussians of each set, added up; NULL: not counted */
+    const trip_camera *camera; /* index space is the common space of the sets */
     trip_gaussian_settings settings;
     /* For the orders by lists and by sheets: their method and h. NULL: by depth. */
     const trip_settings *by_lists;
@@ -56,6 +58,8 @@ int trip_gaussian_frame_begin(trip_gaussian_frame **out, const trip_gaussian_fra
 /* Draws until the deadline (CLOCK_MONOTONIC), and at least one batch. Returns TRIP_FRAME_DONE or
  * TRIP_FRAME_MORE (renderer.h), or a failure. */
 int trip_gaussian_frame_step(trip_gaussian_frame *f, uint64_t deadline_ns);
+/* Draws in the order by depth up to `depth` (camera.h). Later Gaussians wait. */
+int trip_gaussian_frame_step_to(trip_gaussian_frame *f, double depth, uint64_t deadline_ns);
 /* Writes the picture drawn so far: width * height * 4 floats, premultiplied, row 0 at the top, over
  * the background. With settings.depth also width * height distances; otherwise `depth` is NULL. */
 int trip_gaussian_frame_picture(trip_gaussian_frame *f, float *rgba, float *depth);

@@ -30,7 +30,7 @@ typedef struct splat {
 
 struct trip_gaussian_integral {
     trip_gaussian_integral_params params;
-    trip_gaussian_stream *stream; /* NULL once all is read */
+    trip_placed_stream *stream; /* NULL once all is read */
     trip_gaussian *batch;
     size_t batch_count;
     trip_normal_table *table;
@@ -94,10 +94,11 @@ static int open_stream(trip_gaussian_integral *g)
         .plane_count = trip_gaussian_planes_of(c, planes),
         .degree = g->params.settings.degree,
     };
-    int status = trip_gaussian_stream_open(&g->stream, g->params.set, &p, g->params.budget);
+    int status = trip_placed_stream_open(&g->stream, g->params.sets, g->params.set_count, &p,
+                                         g->params.drawn, g->params.budget);
     if (status)
         return status;
-    const trip_gaussian_plan *plan = trip_gaussian_stream_planned(g->stream);
+    const trip_gaussian_plan *plan = trip_placed_stream_planned(g->stream);
     g->room = plan->records;
     g->stats.bricks = plan->bricks;
     g->stats.bytes_read = plan->read_bytes;
@@ -134,7 +135,7 @@ void trip_gaussian_integral_end(trip_gaussian_integral *g)
     if (!g)
         return;
     trip_budget *budget = g->params.budget;
-    trip_gaussian_stream_close(g->stream);
+    trip_placed_stream_close(g->stream);
 #define RELEASE(field, size) trip_budget_release(budget, field, size);
     BUFFERS(RELEASE)
 #undef RELEASE
@@ -223,13 +224,13 @@ static int list_tiles(trip_gaussian_integral *g)
 static int read_batch(trip_gaussian_integral *g)
 {
     const double begun = trip_now_ms();
-    int status = trip_gaussian_stream_next(g->stream, g->batch, NULL, BATCH, &g->batch_count);
+    int status = trip_placed_stream_next(g->stream, g->batch, NULL, BATCH, &g->batch_count);
     g->stats.read_ms += trip_now_ms() - begun;
     if (!status)
         add_batch(g);
     if (status || g->batch_count)
         return status;
-    trip_gaussian_stream_close(g->stream);
+    trip_placed_stream_close(g->stream);
     g->stream = NULL;
     return list_tiles(g);
 }

@@ -15,7 +15,7 @@
 
 #include "budget.h"
 #include "gaussian_picture.h"
-#include "gaussian_set.h"
+#include "placed_stream.h"
 #include "task_runner.h"
 
 /* The default bound of the error of each component. */
@@ -23,9 +23,11 @@
 
 typedef struct trip_gaussian_integral trip_gaussian_integral;
 
-/* The set and the camera must outlive the integral. Distances are not computed. */
+/* The sets and the camera must outlive the integral. Distances are not computed. */
 typedef struct trip_gaussian_integral_params {
-    const trip_gaussian_set *set;
+    const trip_placed_set *sets;
+    unsigned set_count;
+    uint64_t *drawn;           /* Gaussians of each set; NULL: not counted */
     const trip_camera *camera; /* index space is the scene's space */
     trip_gaussian_settings settings;
     double tolerance; /* 0 means TRIP_GAUSSIAN_TOLERANCE */
