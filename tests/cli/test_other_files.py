@@ -64,12 +64,6 @@ VERTICES = "element vertex 3", "property float x", "property float y", "property
 
 # name, contents, texts of the line
 FILES = [
-    ("a.ply", ply(*VERTICES, "element face 1", "property list uchar int vertex_indices"),
-     "a mesh (PLY) of 3 vertices", "MeshLab"),
-    ("b.ply", ply(*VERTICES), "a cloud of 3 points (PLY)", "CloudCompare"),
-    ("d.ply.gz", gzip.compress(ply(*VERTICES)), "a cloud of 3 points (PLY)", "CloudCompare"),
-    ("e.ply.bz2", bz2.compress(ply(*VERTICES)), "a cloud of 3 points (PLY)", "CloudCompare"),
-    ("no-suffix", ply(*VERTICES), "a cloud of 3 points (PLY)", "CloudCompare"),
     ("a.stl", b"solid a\nfacet normal 0 0 1\nouter loop\n", "a mesh (STL)", "MeshLab"),
     ("binary", bytes(80) + struct.pack("<I", 2) + bytes(100), "a mesh (STL)", "MeshLab"),
     ("a.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "a mesh (OBJ)", "MeshLab"),
@@ -157,6 +151,26 @@ class OtherFiles(program.ProgramTest):
             for command in ("render", name, "-o", "a.png"), ("brick", name, "-o", "a.trip"), \
                            ("view", name), ("serve", name):
                 self.leaves_nothing(1, *command, says=says)
+
+    def test_info_describes_a_cloud_of_points(self):
+        rows = ply(*VERTICES) + b"2 0 0.001\n636000.125 850000.5 -1\n"
+        faces = ply(*VERTICES, "element face 1", "property list uchar int vertex_indices") + \
+            b"2 0 0.001\n636000.125 850000.5 -1\n3 0 1 2\n"
+        for name, data in (("a.ply", rows), ("a.ply.gz", gzip.compress(rows)),
+                           ("a.ply.bz2", bz2.compress(rows)), ("no-suffix", rows), ("m.ply", faces)):
+            program.write(name, data)
+            done = json.loads(self.works("info", name, "--json").stdout)
+            self.assertEqual(done["points"], 3)
+            self.assertEqual(done["bounds"], [[0, 0, -1], [636000.125, 850000.5, 0.001]])
+            text = self.works("info", name).stdout.decode()
+            for line in (f"cloud        {name}", "format       PLY, text", "points       3",
+                         "attributes   positions only",
+                         "bounds       x 0 to 636000.125, y 0 to 850000.5, z -1 to 0.001"):
+                self.assertIn(line + "\n", text)
+            self.assertEqual("faces are ignored" in text, name == "m.ply")
+            os.remove(name)
+        program.write("a.ply", rows)
+        self.fails(2, "info", "a.ply", "--spacing", "1,1,1", says="cloud of points")
 
     def test_damaged_gaussian_scenes_are_refused_with_their_names(self):
         for name, data in DAMAGED_SCENES:

@@ -247,7 +247,7 @@ int trip_ply_stream_open(trip_byte_stream **out, const trip_ply_header *h,
     for (const trip_ply_element *i = h->elements; i <= e; i++) {
         if (i->lists)
             return trip_fail(TRIP_ERROR, "read", path,
-                             "the element %s holds a list; Gaussians are read from rows of one "
+                             "the element %s holds a list; rows up to the vertices need one "
                              "length",
                              i->name);
         before += size;

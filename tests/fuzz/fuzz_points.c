@@ -1,0 +1,60 @@
+/* Fuzzes complete files of points, in every format. All values that are read must be finite and in
+ * their ranges, and every pass must give as many points. The first byte chooses the file extension.
+ */
+#include "fuzz.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <unistd.h>
+
+#include "point_file.h"
+
+static const char *const extensions[] = { "ply", "las", "pcd", "pts", "ptx", "xyz", "e57", "vdb" };
+
+static void check(const trip_point *p, const trip_point_info *info)
+{
+    double length = 0;
+    for (int a = 0; a < 3; a++) {
+        FUZZ_PROMISE(isfinite(p->position[a]));
+        FUZZ_PROMISE(p->colour[a] >= 0 && p->colour[a] <= 1);
+        length += (double)p->normal[a] * (double)p->normal[a];
+    }
+    FUZZ_PROMISE(length == 0 || fabs(length - 1) < 1e-5);
+    FUZZ_PROMISE(isfinite(p->radius) && p->radius >= 0);
+    FUZZ_PROMISE(isfinite(p->intensity) && isfinite(p->gps_time));
+    FUZZ_PROMISE(info->scan_count == 0 || p->scan < info->scan_count);
+}
+
+/* Reads up to a bound of points. Returns their number. */
+static size_t read_through(trip_point_file *f)
+{
+    enum { ROOM = 100, MOST = 20000 };
+    trip_point batch[ROOM];
+    size_t got = 1, sum = 0;
+    while (got > 0 && sum < MOST && trip_point_file_read(f, batch, ROOM, &got) == 0) {
+        for (size_t i = 0; i < got; i++)
+            check(&batch[i], trip_point_file_info(f));
+        sum += got;
+    }
+    return sum;
+}
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
+{
+    char path[64];
+    trip_point_file *file;
+    if (size < 1)
+        return 0;
+    snprintf(path, sizeof path, "/dev/shm/fuzz-%d.%s", (int)getpid(),
+             extensions[data[0] % (sizeof extensions / sizeof *extensions)]);
+    FILE *f = fopen(path, "wb");
+    FUZZ_PROMISE(f && fwrite(data + 1, 1, size - 1, f) == size - 1 && fclose(f) == 0);
+    if (trip_point_file_open(path, &file) == 0) {
+        const size_t count = read_through(file);
+        if (trip_point_file_rewind(file) == 0)
+            FUZZ_PROMISE(read_through(file) == count);
+        trip_point_file_close(file);
+    }
+    unlink(path);
+    return 0;
+}
