@@ -17,6 +17,7 @@ enum { HEAD_BYTES = 1 << 16, BATCH = 1024, SAMPLED_POINTS = 1 << 16 };
 
 static const trip_point_reader *const readers[] = {
     &trip_read_point_ply,
+    &trip_read_las,
 };
 
 bool trip_point_suffix(const char *path, const char *suffix)
@@ -195,7 +196,7 @@ const trip_point_info *trip_point_file_info(const trip_point_file *f)
 
 int trip_point_file_rewind(trip_point_file *f)
 {
-    f->left_out = f->empty = 0;
+    f->left_out = f->empty = f->deleted = 0;
     return f->reader->rewind(f);
 }
 
@@ -278,7 +279,7 @@ static void see(seen *s, const trip_point *p)
 }
 
 /* Notes bounds of the header that differ from the points. A step of 1e-6 of the extent is allowed
- * for rounding. */
+ * for rounding. Bounds may contain deleted points. */
 static void compare_bounds(trip_point_file *f, const seen *s)
 {
     const trip_point_info *i = &f->info;
@@ -286,7 +287,9 @@ static void compare_bounds(trip_point_file *f, const seen *s)
         const double extent = s->info.hi[a] - s->info.lo[a];
         const double step = fmax(1e-6 * extent, 1e-3 * (extent > 1 ? 1 : extent)) +
                             1e-9 * fmax(fabs(s->info.lo[a]), fabs(s->info.hi[a]));
-        if (fabs(i->lo[a] - s->info.lo[a]) <= step && fabs(i->hi[a] - s->info.hi[a]) <= step)
+        const double below = s->info.lo[a] - i->lo[a], above = i->hi[a] - s->info.hi[a];
+        const double most = f->deleted > 0 ? INFINITY : step;
+        if (below >= -step && below <= most && above >= -step && above <= most)
             continue;
         trip_point_note(f,
                         "the header states %c from %.10g to %.10g, but the points reach from "
@@ -316,7 +319,7 @@ static void judge_colours(trip_point_file *f, const seen *s)
 static void settle(trip_point_file *f, const seen *s)
 {
     trip_point_info *i = &f->info;
-    const uint64_t rows = s->info.points + f->left_out + f->empty;
+    const uint64_t rows = s->info.points + f->left_out + f->empty + f->deleted;
     compare_bounds(f, s);
     judge_colours(f, s);
     memcpy(i->lo, s->info.lo, sizeof i->lo);
@@ -324,7 +327,7 @@ static void settle(trip_point_file *f, const seen *s)
     i->bounded = i->surveyed = true;
     i->count = rows;
     i->points = s->info.points;
-    i->left_out = f->left_out;
+    i->left_out = f->left_out + f->deleted;
     i->empty = f->empty;
     i->intensity_lo = s->info.intensity_lo;
     i->intensity_hi = s->info.intensity_hi;
@@ -332,11 +335,17 @@ static void settle(trip_point_file *f, const seen *s)
     i->time_hi = s->info.time_hi;
     memcpy(i->classes, s->info.classes, sizeof i->classes);
     i->returns_max = s->info.returns_max;
-    if (i->left_out > 0)
+    if (i->intensity_lo == 0 && i->intensity_hi == 0)
+        i->attributes &= ~(unsigned)TRIP_POINT_INTENSITY;
+    if (f->left_out > 0)
         trip_point_note(f,
                         "%" PRIu64 " of %" PRIu64
                         " points have a position that is not finite; they are left out",
-                        i->left_out, rows);
+                        f->left_out, rows);
+    if (f->deleted > 0)
+        trip_point_note(
+            f, "%" PRIu64 " of %" PRIu64 " points are marked as withheld; they are left out",
+            f->deleted, rows);
 }
 
 /* Reads all points with the colours of the reader. */

@@ -64,9 +64,9 @@ void trip_point_file_close(trip_point_file *f); /* NULL is allowed */
 const trip_point_info *trip_point_file_info(const trip_point_file *f);
 
 /* Reads all points once, and rewinds. Then the info is exact: bounds, counts, ranges, and the
- * attributes. Colours that are all 0 are no attribute any more. Without a survey, the first points
- * decide whether colours of sixteen bits hold only eight. A cloud without any point is a reported
- * failure. */
+ * attributes. Colours and intensities that are all 0 are no attribute any more. Without a survey,
+ * the first points decide whether colours of sixteen bits hold only eight. A cloud without any
+ * point is a reported failure. */
 int trip_point_file_survey(trip_point_file *f);
 
 /* Reads up to `room` points. *got_out is 0 only at the end. Points without a finite position are

@@ -40,9 +40,10 @@ struct trip_point_file {
     /* of point_file.c: */
     float colour_factor;
     uint64_t left_out, empty; /* in this pass */
+    uint64_t deleted;         /* points that the reader left out in this pass, as their marks ask */
 };
 
-extern const trip_point_reader trip_read_point_ply;
+extern const trip_point_reader trip_read_point_ply, trip_read_las;
 
 /* Marks a point that is left out. */
 void trip_point_drop(trip_point *p);
