@@ -18,6 +18,11 @@ enum { HEAD_BYTES = 1 << 16, BATCH = 1024, SAMPLED_POINTS = 1 << 16 };
 static const trip_point_reader *const readers[] = {
     &trip_read_point_ply,
     &trip_read_las,
+    &trip_read_pcd,
+    /* without a magic number: */
+    &trip_read_ptx,
+    &trip_read_pts,
+    &trip_read_xyz,
 };
 
 bool trip_point_suffix(const char *path, const char *suffix)
@@ -72,20 +77,25 @@ void trip_point_add_extra(trip_point_file *f, const char *name)
     snprintf(f->info.extras + used, sizeof f->info.extras - used, "%s%s", used ? ", " : "", name);
 }
 
-trip_point_scan *trip_point_add_scans(trip_point_file *f, uint32_t count)
+trip_point_scan *trip_point_add_scan(trip_point_file *f)
 {
-    const size_t all = (size_t)f->info.scan_count + count;
-    trip_point_scan *scans = all <= UINT32_MAX ? calloc(all, sizeof *scans) : NULL;
-    if (!scans) {
-        trip_point_no_memory(f);
+    if (f->info.scan_count == TRIP_POINT_SCANS_MAX) {
+        trip_fail(TRIP_ERROR, "read", f->path, "holds more than %d scans", TRIP_POINT_SCANS_MAX);
         return NULL;
     }
-    if (f->info.scan_count)
-        memcpy(scans, f->info.scans, f->info.scan_count * sizeof *scans);
-    free((void *)(uintptr_t)f->info.scans);
-    f->info.scans = scans;
-    f->info.scan_count = (uint32_t)all;
-    return scans + all - count;
+    if (f->info.scan_count == f->scan_room) {
+        const uint32_t room = f->scan_room ? 2 * f->scan_room : 4;
+        trip_point_scan *scans = realloc(f->scans, room * sizeof *scans);
+        if (!scans) {
+            trip_point_no_memory(f);
+            return NULL;
+        }
+        f->info.scans = f->scans = scans;
+        f->scan_room = room;
+    }
+    trip_point_scan *made = &f->scans[f->info.scan_count++];
+    *made = (trip_point_scan){ 0 };
+    return made;
 }
 
 /* Sets *out to the reader of a file, or to NULL. */
@@ -184,7 +194,7 @@ void trip_point_file_close(trip_point_file *f)
     if (!f)
         return;
     f->reader->close(f);
-    free((void *)(uintptr_t)f->info.scans);
+    free(f->scans);
     free(f->path);
     free(f);
 }

@@ -32,8 +32,10 @@ typedef struct trip_point_info {
     /* The bounds that the file states, if `bounded`. trip_point_file_survey() replaces them. */
     bool bounded;
     double lo[3], hi[3];
-    uint32_t scan_count;          /* 0 or more; scans without a pose and grid may lack an entry */
-    const trip_point_scan *scans; /* valid until the file is closed */
+    /* The scans that the header lists, or those up to the last point that was read. A cloud without
+     * poses and grids has none. The array may move with every read. */
+    uint32_t scan_count;
+    const trip_point_scan *scans;
     char extras[TRIP_POINT_TEXT_BYTES];   /* further attributes, by names; or "" */
     char comments[TRIP_POINT_TEXT_BYTES]; /* of the program that wrote the file; or "" */
     /* Choices and faults of the file, one sentence each. */

@@ -39,11 +39,14 @@ struct trip_point_file {
 
     /* of point_file.c: */
     float colour_factor;
+    trip_point_scan *scans; /* of the info */
+    uint32_t scan_room;
     uint64_t left_out, empty; /* in this pass */
     uint64_t deleted;         /* points that the reader left out in this pass, as their marks ask */
 };
 
-extern const trip_point_reader trip_read_point_ply, trip_read_las;
+extern const trip_point_reader trip_read_point_ply, trip_read_las, trip_read_pcd, trip_read_ptx,
+    trip_read_pts, trip_read_xyz;
 
 /* Marks a point that is left out. */
 void trip_point_drop(trip_point *p);
@@ -55,9 +58,10 @@ __attribute__((format(printf, 2, 3))) void trip_point_note(trip_point_file *f, c
 /* Adds the name of a further attribute to the info. */
 void trip_point_add_extra(trip_point_file *f, const char *name);
 
-/* Adds scans to the info. Returns the array of `count` zeroed scans, or NULL after a reported
- * failure. */
-trip_point_scan *trip_point_add_scans(trip_point_file *f, uint32_t count);
+enum { TRIP_POINT_SCANS_MAX = 1 << 16 };
+
+/* Adds a zeroed scan to the info. Returns it, or NULL after a reported failure. */
+trip_point_scan *trip_point_add_scan(trip_point_file *f);
 
 /* Returns whether a file name ends in a suffix, also before ".gz" or ".bz2". */
 bool trip_point_suffix(const char *path, const char *suffix);

@@ -11,53 +11,16 @@
 #include <strings.h>
 
 #include "ply_header.h"
+#include "point_fields.h"
 #include "report.h"
 
 enum { BUFFER_BYTES = 1 << 18 };
 
-typedef enum field {
-    X,
-    Y,
-    Z,
-    NX,
-    NY,
-    NZ,
-    RED,
-    GREEN,
-    BLUE,
-    RADIUS,
-    INTENSITY,
-    CLASSIFICATION,
-    RETURN_NUMBER,
-    RETURNS,
-    GPS_TIME,
-    FIELDS
-} field;
-
-/* The names of each field, in lower case. "scalar_" in front of a name does not count. */
-static const char *const names[FIELDS][6] = {
-    [X] = { "x" },
-    [Y] = { "y" },
-    [Z] = { "z" },
-    [NX] = { "nx", "normal_x" },
-    [NY] = { "ny", "normal_y" },
-    [NZ] = { "nz", "normal_z" },
-    [RED] = { "red", "diffuse_red", "r" },
-    [GREEN] = { "green", "diffuse_green", "g" },
-    [BLUE] = { "blue", "diffuse_blue", "b" },
-    [RADIUS] = { "radius", "pscale", "point_radius" },
-    [INTENSITY] = { "intensity", "reflectance" },
-    [CLASSIFICATION] = { "classification", "class" },
-    [RETURN_NUMBER] = { "return_number", "returnnumber" },
-    [RETURNS] = { "number_of_returns", "numberofreturns", "num_returns" },
-    [GPS_TIME] = { "gps_time", "gpstime", "timestamp" },
-};
-
 typedef struct ply {
     trip_ply_header header;
     const trip_ply_element *vertex;
-    const trip_ply_property *fields[FIELDS];
-    float colour_unit; /* divides the colours */
+    const trip_ply_property *fields[TRIP_FIELDS]; /* NULL for an absent one */
+    float colour_unit;                            /* divides the colours */
     trip_byte_stream *stream;
     uint64_t done;
     unsigned char *rows;
@@ -79,55 +42,34 @@ static bool probe(const trip_point_head *head)
     return true;
 }
 
-static int field_of(const char *name)
-{
-    if (strncasecmp(name, "scalar_", 7) == 0)
-        name += 7;
-    for (int i = 0; i < FIELDS; i++)
-        for (size_t k = 0; k < sizeof names[i] / sizeof *names[i] && names[i][k]; k++)
-            if (strcasecmp(name, names[i][k]) == 0)
-                return i;
-    return FIELDS;
-}
-
-static bool has(const ply *p, field first, int count)
-{
-    for (int i = 0; i < count; i++)
-        if (!p->fields[first + i])
-            return false;
-    return true;
-}
-
 static int find_fields(trip_point_file *f, ply *p)
 {
+    unsigned found = 0;
     for (uint32_t i = 0; i < p->vertex->properties; i++) {
         const trip_ply_property *property = &p->header.properties[p->vertex->first + i];
-        const int found = field_of(property->name);
-        if (found < FIELDS && !p->fields[found])
-            p->fields[found] = property;
-        else if (strcasecmp(property->name, "alpha") != 0)
+        const trip_point_field field = trip_point_field_of(property->name);
+        if (field < TRIP_FIELDS && !p->fields[field]) {
+            p->fields[field] = property;
+            found |= 1u << field;
+        } else if (strcasecmp(property->name, "alpha") != 0) {
             trip_point_add_extra(f, property->name);
+        }
     }
     for (int a = 0; a < 3; a++)
-        if (!p->fields[X + a])
+        if (!p->fields[TRIP_FIELD_X + a])
             return trip_fail(TRIP_ERROR, "read", f->path,
                              "lacks the property %c, which a cloud of points needs", 'x' + a);
-    f->info.attributes |=
-        (has(p, NX, 3) ? TRIP_POINT_NORMAL : 0) | (has(p, RED, 3) ? TRIP_POINT_COLOUR : 0) |
-        (has(p, RADIUS, 1) ? TRIP_POINT_RADIUS : 0) |
-        (has(p, INTENSITY, 1) ? TRIP_POINT_INTENSITY : 0) |
-        (has(p, CLASSIFICATION, 1) ? TRIP_POINT_CLASSIFICATION : 0) |
-        (has(p, RETURNS, 1) || has(p, RETURN_NUMBER, 1) ? TRIP_POINT_RETURNS : 0) |
-        (has(p, GPS_TIME, 1) ? TRIP_POINT_TIME : 0);
+    f->info.attributes = trip_point_attributes_of(found);
     return 0;
 }
 
 /* Bytes and 16 bits are whole ranges. Floats are 0 to 1, or another range that the values tell. */
 static void find_colours(trip_point_file *f, ply *p)
 {
+    p->colour_unit = 1;
     if (!(f->info.attributes & TRIP_POINT_COLOUR))
         return;
-    const trip_scalar type = p->fields[RED]->stated_type;
+    const trip_scalar type = p->fields[TRIP_FIELD_RED]->stated_type;
     p->colour_unit = type == TRIP_U8 ? 255 : 1;
     if (type != TRIP_U8)
         f->colour_form =
@@ -156,7 +98,7 @@ static int find_grid(trip_point_file *f, const ply *p)
                         grid->count);
         return 0;
     }
-    trip_point_scan *scan = trip_point_add_scans(f, 1);
+    trip_point_scan *scan = trip_point_add_scan(f);
     if (!scan)
         return TRIP_ERROR;
     scan->width = width;
@@ -210,32 +152,13 @@ static int open_ply(trip_point_file *f)
     return trip_ply_stream_open(&p->stream, &p->header, p->vertex, f->path);
 }
 
-static double value(const ply *p, field from, const unsigned char *row)
+static void decode(const ply *p, const unsigned char *row, trip_point *out)
 {
-    return p->fields[from] ? trip_ply_value(&p->header, p->fields[from], row) : 0;
-}
-
-static uint8_t byte_of(double v)
-{
-    return v >= 0 && v < 255.5 ? (uint8_t)v : 0;
-}
-
-static void decode(const trip_point_file *f, const unsigned char *row, trip_point *out)
-{
-    const ply *p = f->state;
-    const unsigned has_bits = f->info.attributes;
-    for (int a = 0; a < 3; a++)
-        out->position[a] = value(p, X + a, row);
-    for (int a = 0; a < 3 && has_bits & TRIP_POINT_NORMAL; a++)
-        out->normal[a] = (float)value(p, NX + a, row);
-    for (int c = 0; c < 3 && has_bits & TRIP_POINT_COLOUR; c++)
-        out->colour[c] = (float)value(p, RED + c, row) / p->colour_unit;
-    out->radius = (float)value(p, RADIUS, row);
-    out->intensity = (float)value(p, INTENSITY, row);
-    out->classification = byte_of(value(p, CLASSIFICATION, row));
-    out->return_number = byte_of(value(p, RETURN_NUMBER, row));
-    out->returns = byte_of(value(p, RETURNS, row));
-    out->gps_time = value(p, GPS_TIME, row);
+    for (int i = 0; i < TRIP_FIELDS; i++)
+        if (p->fields[i])
+            trip_point_set(out, i, trip_ply_value(&p->header, p->fields[i], row));
+    for (int c = 0; c < 3; c++)
+        out->colour[c] /= p->colour_unit;
 }
 
 static int read_ply(trip_point_file *f, trip_point *out, size_t room, size_t *got_out)
@@ -252,7 +175,7 @@ static int read_ply(trip_point_file *f, trip_point *out, size_t room, size_t *go
     if (status < 0)
         return status;
     for (size_t i = 0; i < count; i++)
-        decode(f, p->rows + i * p->vertex->row_bytes, &out[i]);
+        decode(p, p->rows + i * p->vertex->row_bytes, &out[i]);
     p->done += count;
     return 0;
 }

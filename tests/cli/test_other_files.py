@@ -72,9 +72,6 @@ FILES = [
     ("a.glb", b"glTF\2\0\0\0" + bytes(20), "glTF", "Blender"),
     ("a.gltf", b'{"asset":{"version":"2.0"}}', "glTF", "Blender"),
     ("a.e57", b"ASTM-E57" + bytes(300), "E57", "CloudCompare"),
-    ("a.pcd", b"# .PCD v.7\nVERSION .7\nFIELDS x y z\n", "PCD", "CloudCompare"),
-    ("b.pcd", b"VERSION 0.7\nFIELDS x y z\nDATA binary\n" + bytes(40), "PCD", "CloudCompare"),
-    ("a.xyz", b"1 2 3\n4 5 6\n", "scanned points", "CloudCompare"),
     ("a.vtk", b"# vtk DataFile Version 3.0\nx\nASCII\nDATASET POLYDATA\n", "legacy VTK", "ParaView"),
     ("a.vti", b'<?xml version="1.0"?>\n<VTKFile type="ImageData" version="0.1">\n',
      "VTK XML (ImageData)", "ParaView"),
@@ -104,7 +101,7 @@ FILES = [
     ("a.pdf", b"%PDF-1.4\n%\xe2\xe3", "PDF", "not a volume"),
     ("a.mp4", b"\0\0\0\x18ftypmp42" + bytes(40), "video", "ffmpeg"),
     ("a.jpg", b"\xff\xd8\xff\xe0" + bytes(40), "JPEG", "convert"),
-    ("a.csv", b"x,y,z\n1,2,3\n4,5,6\n7,8,9\n", "table of numbers", "NRRD"),
+    ("a.csv", b"u,v,w\n1,2,3\n4,5,6\n7,8,9\n", "table of numbers", "NRRD"),
     ("a.txt", b"hello\n" * 9, "is text", "not a volume"),
     ("b.txt", b"{" + b"hello " * 900, "is text", "not a volume"),
     ("program", b"\x7fELF" + bytes(60), "a program", "not a volume"),
@@ -147,7 +144,10 @@ class OtherFiles(program.ProgramTest):
         program.write("a.ply", ply(*VERTICES))
         program.write("path.json", json.dumps(PATH).encode())
         program.write("a.las", b"LASF" + bytes(300))
+        program.write("a.pcd", b"# .PCD v.7\nVERSION .7\nFIELDS x y z\n")
+        program.write("a.xyz", b"1 2 3\n4 5 6\n")
         for name, says in (("a.ply", "a cloud of 3 points"), ("a.las", "LAS or LAZ"),
+                           ("a.pcd", "PCD"), ("a.xyz", "scanned points"),
                            ("path.json", "--path")):
             for command in ("render", name, "-o", "a.png"), ("brick", name, "-o", "a.trip"), \
                            ("view", name), ("serve", name):
