@@ -19,6 +19,7 @@ static const trip_point_reader *const readers[] = {
     &trip_read_point_ply,
     &trip_read_las,
     &trip_read_pcd,
+    &trip_read_e57,
     /* without a magic number: */
     &trip_read_ptx,
     &trip_read_pts,

@@ -29,6 +29,8 @@ typedef struct trip_point_info {
      */
     uint64_t count;
     unsigned attributes; /* TRIP_POINT_NORMAL and so on */
+    /* The range of intensities that the file states; 0 and 0 if it states none. */
+    float intensity_limits[2];
     /* The bounds that the file states, if `bounded`. trip_point_file_survey() replaces them. */
     bool bounded;
     double lo[3], hi[3];

@@ -71,7 +71,6 @@ FILES = [
     ("a.off", b"OFF\n3 1 0\n", "a mesh (OFF)", "MeshLab"),
     ("a.glb", b"glTF\2\0\0\0" + bytes(20), "glTF", "Blender"),
     ("a.gltf", b'{"asset":{"version":"2.0"}}', "glTF", "Blender"),
-    ("a.e57", b"ASTM-E57" + bytes(300), "E57", "CloudCompare"),
     ("a.vtk", b"# vtk DataFile Version 3.0\nx\nASCII\nDATASET POLYDATA\n", "legacy VTK", "ParaView"),
     ("a.vti", b'<?xml version="1.0"?>\n<VTKFile type="ImageData" version="0.1">\n',
      "VTK XML (ImageData)", "ParaView"),
@@ -146,8 +145,9 @@ class OtherFiles(program.ProgramTest):
         program.write("a.las", b"LASF" + bytes(300))
         program.write("a.pcd", b"# .PCD v.7\nVERSION .7\nFIELDS x y z\n")
         program.write("a.xyz", b"1 2 3\n4 5 6\n")
+        program.write("a.e57", b"ASTM-E57" + bytes(300))
         for name, says in (("a.ply", "a cloud of 3 points"), ("a.las", "LAS or LAZ"),
-                           ("a.pcd", "PCD"), ("a.xyz", "scanned points"),
+                           ("a.pcd", "PCD"), ("a.xyz", "scanned points"), ("a.e57", "E57"),
                            ("path.json", "--path")):
             for command in ("render", name, "-o", "a.png"), ("brick", name, "-o", "a.trip"), \
                            ("view", name), ("serve", name):

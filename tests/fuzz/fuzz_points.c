@@ -1,10 +1,11 @@
 /* Fuzzes complete files of points, in every format. All values that are read must be finite and in
  * their ranges, and every pass must give as many points. The first byte chooses the file extension.
- */
+ * The pages of E57 get valid checksums. */
 #include "fuzz.h"
 
 #include <math.h>
 #include <stdio.h>
+#include <string.h>
 #include <unistd.h>
 
 #include "point_file.h"
@@ -39,6 +40,33 @@ static size_t read_through(trip_point_file *f)
     return sum;
 }
 
+/* CRC-32C, bit by bit. */
+static uint32_t checksum(const uint8_t *bytes, size_t count)
+{
+    uint32_t r = UINT32_MAX;
+    for (size_t i = 0; i < count; i++) {
+        r ^= bytes[i];
+        for (int bit = 0; bit < 8; bit++)
+            r = r >> 1 ^ (r & 1 ? 0x82f63b78 : 0);
+    }
+    return ~r;
+}
+
+/* Writes the checksum at the end of each page of E57, in the order of the standard. */
+static void sign_pages(uint8_t *file, size_t size)
+{
+    uint64_t page = 0;
+    if (size < 48 || memcmp(file, "ASTM-E57", 8) != 0)
+        return;
+    for (int i = 0; i < 8; i++)
+        page |= (uint64_t)file[40 + i] << 8 * i;
+    for (size_t at = 0; page > 4 && page <= size - at; at += page) {
+        const uint32_t sum = checksum(file + at, page - 4);
+        for (int i = 0; i < 4; i++)
+            file[at + page - 4 + (size_t)i] = (uint8_t)(sum >> (24 - 8 * i));
+    }
+}
+
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
     char path[64];
@@ -47,8 +75,13 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         return 0;
     snprintf(path, sizeof path, "/dev/shm/fuzz-%d.%s", (int)getpid(),
              extensions[data[0] % (sizeof extensions / sizeof *extensions)]);
+    uint8_t *bytes = malloc(size);
     FILE *f = fopen(path, "wb");
-    FUZZ_PROMISE(f && fwrite(data + 1, 1, size - 1, f) == size - 1 && fclose(f) == 0);
+    FUZZ_PROMISE(f && bytes);
+    memcpy(bytes, data + 1, size - 1);
+    sign_pages(bytes, size - 1);
+    FUZZ_PROMISE(fwrite(bytes, 1, size - 1, f) == size - 1 && fclose(f) == 0);
+    free(bytes);
     if (trip_point_file_open(path, &file) == 0) {
         const size_t count = read_through(file);
         if (trip_point_file_rewind(file) == 0)
