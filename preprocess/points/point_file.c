@@ -20,6 +20,7 @@ static const trip_point_reader *const readers[] = {
     &trip_read_las,
     &trip_read_pcd,
     &trip_read_e57,
+    &trip_read_vdb_points,
     /* without a magic number: */
     &trip_read_ptx,
     &trip_read_pts,
