@@ -72,9 +72,26 @@ int library_check_scene_options(const triptych_brick_options *options)
     return 0;
 }
 
+bool library_is_scene(triptych *t, const char *input)
+{
+    return triptych_is_scene_file(input) || triptych_is_gaussians(t, input);
+}
+
 int library_fail_scene(const char *input)
 {
-    return trip_fail(TRIP_USAGE, "usage", input, "is a Gaussian scene; `triptych render` draws it");
+    return trip_fail(TRIP_USAGE, "usage", input, "is a %s; `triptych render` draws it",
+                     triptych_is_scene_file(input) ? "scene file" : "Gaussian scene");
+}
+
+int library_check_kind(triptych *t, const char *input, const draw_settings *settings,
+                       const triptych_resources *resources,
+                       const triptych_transfer_function *function)
+{
+    const bool is_scene = triptych_is_gaussians(t, input) != 0;
+    int status = draw_settings_check_kind(settings, resources, is_scene);
+    if (!status && is_scene && (function->name || function->window > 0))
+        status = library_fail_scene_option(function->name ? "tf" : "window");
+    return status;
 }
 
 void library_hush(triptych *t, bool quiet)

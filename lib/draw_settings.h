@@ -92,6 +92,7 @@ enum {
     DRAW_TRAVERSAL,
     DRAW_WEIGHTS,
     DRAW_ORDER,
+    DRAW_SHEET,
     DRAW_HARMONICS, /* named "sh" */
     DRAW_OPTIONS
 };
@@ -126,8 +127,14 @@ int draw_settings_check_ranges(const draw_settings *s);
 /* Checks every range and rule, as triptych_check_settings() does. With `idle_too`, also refuses
  * settings that only have no effect. */
 int draw_settings_check(const draw_settings *s, triptych_renderer *renderer, bool idle_too);
-/* Checks that all settings apply to the open data: a Gaussian scene or a volume. */
-int draw_settings_check_kind(const draw_settings *s, bool is_scene);
+/* Checks that all settings and resources apply to a Gaussian scene or to a volume. */
+int draw_settings_check_kind(const draw_settings *s, const triptych_resources *r, bool is_scene);
+/* Returns whether a row applies, with the other settings as they are. */
+bool draw_settings_applies(const draw_settings *s, int row, bool is_scene);
+/* Returns whether a choice of a row that applies does too. */
+bool draw_settings_choice_applies(int row, int choice, bool is_scene);
+/* Unsets all settings that draw_settings_check_kind() would refuse. */
+void draw_settings_drop_kind(draw_settings *s, bool is_scene);
 /* Unsets all settings that the other settings or the renderer exclude. */
 void draw_settings_drop_excluded(draw_settings *s, triptych_renderer renderer);
 /* Returns the name of a given setting that only splats have, or NULL. */

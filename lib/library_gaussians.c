@@ -138,7 +138,7 @@ static int read_some(void *user, trip_gaussian *out, size_t room, size_t *got)
 
 static void show_passed(void *user, uint64_t passed)
 {
-    enum { PASSES = 4 };
+    enum { PASSES = 6 };
     const bricking *b = user;
     const uint64_t all = PASSES * trip_gaussian_file_info(b->file)->count;
     if (b->t->show)
@@ -175,6 +175,7 @@ static int brick(bricking *b, const char *path, const char *data_set,
         .source_user = b,
         .source_name = path,
         .degree = info->degree,
+        .harmonics = (trip_brick_harmonics)options->harmonics,
         .flags = (info->antialiased ? TRIP_GAUSSIAN_ANTIALIASED : 0) |
                  (info->flat ? TRIP_GAUSSIAN_FLAT : 0) |
                  (!strcmp(info->up, "-y") ? TRIP_GAUSSIAN_Y_DOWN : 0),
@@ -185,6 +186,9 @@ static int brick(bricking *b, const char *path, const char *data_set,
     trip_brick_gaussians_result made;
     int status = trip_brick_gaussians(&params, budget, &made);
     b->seen.count = status ? 0 : made.records;
+    b->seen.coarse = made.coarse;
+    b->seen.palette = made.palette;
+    b->seen.palette_error = made.palette_error;
     b->seen.left_out = trip_gaussian_file_left_out(b->file);
     free(notes);
     return status;
@@ -198,7 +202,10 @@ int triptych_brick_gaussians(triptych *t, const char *path, const char *data_set
     const triptych_brick_options *o = options ? options : &defaults;
     bricking b = { .t = t };
     trip_budget *budget = NULL;
-    int status = trip_gaussian_file_open(path, &b.file);
+    int status = o->harmonics < TRIPTYCH_STORED_HARMONICS_AUTO ||
+                         o->harmonics > TRIPTYCH_STORED_HARMONICS_WHOLE
+                     ? trip_fail(TRIP_USAGE, "brick", path, "unknown kind of stored harmonics")
+                     : trip_gaussian_file_open(path, &b.file);
     if (!status)
         status = trip_budget_create(&budget, o->memory_bytes);
     if (!status) {
