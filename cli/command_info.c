@@ -17,6 +17,7 @@
 #include "library.h"
 #include "own_file_info.h"
 #include "placed_input.h"
+#include "point_info_print.h"
 #include "command_line.h"
 #include "report.h"
 #include "size_print.h"
@@ -569,11 +570,12 @@ int trip_command_info(int argc, char **argv)
                           [VOLUME] = { .table = &volume_options_table, .base = &o.volume } } };
     const command_line c = {
         .args_doc = "NAME.trip|VOLUME",
-        .doc = "Prints the contents of a data set: grid, values, sizes and source. Of a volume, it "
-               "prints the grid, a look at the values, and the series of a DICOM folder. Of a "
-               "Gaussian "
-               "scene, it prints count, degree and bounds. Of other files, it prints what they are "
-               "and what reads them.",
+        .doc =
+            "Prints the contents of a data set: grid, values, sizes and source. Of a volume, it "
+            "prints the grid, a look at the values, and the series of a DICOM folder. Of a "
+            "Gaussian scene, it prints count, degree and bounds. Of a cloud of points, it prints "
+            "count, attributes and bounds. Of other files, it prints what they are and what "
+            "reads them.",
         .sets = p.sets,
         .set_count = SETS,
         .argument = add_input,
@@ -587,6 +589,8 @@ int trip_command_info(int argc, char **argv)
         status = library_create(&d.t, NULL);
     if (status == 0 && gaussian_info_wanted(d.t, o.path))
         status = gaussian_info_print(d.t, o.path, p.sets[VOLUME].given, o.json != 0);
+    else if (status == 0 && triptych_is_points(d.t, o.path))
+        status = point_info_print(d.t, o.path, p.sets[VOLUME].given, o.json != 0);
     else if (status == 0 && !o.verify && triptych_is_scene_file(o.path))
         status = placed_input_print(d.t, o.path, p.sets[VOLUME].given, o.json != 0);
     else if (status == 0 && !o.verify && own_file_wanted(o.path))

@@ -323,6 +323,44 @@ TRIPTYCH_API int triptych_brick_gaussians(triptych *t, const char *path, const c
                                           const triptych_brick_options *options,
                                           triptych_gaussians *out);
 
+/* Attributes of points, as bits. */
+enum {
+    TRIPTYCH_POINT_NORMAL = 1,
+    TRIPTYCH_POINT_RADIUS = 2,
+    TRIPTYCH_POINT_COLOUR = 4,
+    TRIPTYCH_POINT_INTENSITY = 8,
+    TRIPTYCH_POINT_CLASSIFICATION = 16,
+    TRIPTYCH_POINT_RETURNS = 32,
+    TRIPTYCH_POINT_TIME = 64,
+    TRIPTYCH_POINT_SCAN = 128, /* several scans, or one with a pose */
+};
+
+/* A cloud of points, such as a laser scan. */
+typedef struct triptych_points {
+    char format[64];     /* "LAS 1.2, point format 3", ... */
+    char extras[1024];   /* further attributes, by names; or "" */
+    char comments[1024]; /* of the program that wrote it; or "" */
+    uint64_t points;     /* without those that are left out */
+    uint64_t left_out;   /* points with a position that is not finite, or marked as deleted */
+    uint64_t empty;      /* cells of range grids without a point */
+    unsigned attributes; /* TRIPTYCH_POINT_NORMAL and so on */
+    double lo[3], hi[3]; /* of the positions */
+    double intensity_min, intensity_max;
+    double time_min, time_max;
+    uint64_t classes[256];  /* points of each classification */
+    unsigned returns_max;   /* of a pulse */
+    unsigned scans;         /* with a pose or a grid */
+    unsigned posed_scans;   /* scans with a pose */
+    uint64_t width, height; /* of the range grid of a lone scan, or 0 */
+    unsigned notes;
+    char note[16][256]; /* choices and faults of the file, one sentence each */
+} triptych_points;
+
+/* Returns 1 if a file is a cloud of points, otherwise 0. Reports nothing. */
+TRIPTYCH_API int triptych_is_points(triptych *t, const char *path);
+/* Reads a cloud of points and describes it. */
+TRIPTYCH_API int triptych_describe_points(triptych *t, const char *path, triptych_points *out);
+
 /* The range of a part of a volume's values. */
 typedef struct triptych_values {
     double share; /* of the volume; 1 for all of it, 0 if nothing is known */

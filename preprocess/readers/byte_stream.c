@@ -380,6 +380,14 @@ int trip_byte_stream_read(trip_byte_stream *s, void *to, size_t bytes)
     return s->done == s->source.size_bytes && !plain ? finish(s) : 0;
 }
 
+int trip_byte_stream_read_some(trip_byte_stream *s, void *to, size_t bytes, size_t *got_out)
+{
+    const int status = fetch(s, to, bytes, got_out);
+    if (status == 0 && *got_out < bytes && s->codec_ready && !s->ended)
+        return trip_fail(TRIP_ERROR, "read", s->path, "compressed data is truncated at its end");
+    return status;
+}
+
 /* Skips bytes by reading them, decompressed and, if `text`, decoded. */
 static int skip_decoded(trip_byte_stream *s, uint64_t bytes, bool text)
 {

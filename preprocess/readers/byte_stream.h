@@ -41,6 +41,9 @@ int trip_byte_stream_rewind(trip_byte_stream *s);
  * reported failure. The read that reaches the end also verifies the checksum. */
 int trip_byte_stream_read(trip_byte_stream *s, void *to, size_t bytes);
 
+/* Reads up to `bytes` bytes, fewer only at the end of the file. For sources of 0 size_bytes. */
+int trip_byte_stream_read_some(trip_byte_stream *s, void *to, size_t bytes, size_t *got_out);
+
 /* Skips the next `bytes` bytes, which must end before the source's size. Skipping is free in a
  * plain file; compressed data is decompressed. */
 int trip_byte_stream_skip(trip_byte_stream *s, uint64_t bytes);

@@ -29,8 +29,7 @@ typedef struct state {
     void *of_module;
 } state;
 
-/* Loads the module unless it is loaded already. It is never closed. */
-static int load_module(const trip_volume_reader **out)
+int trip_vdb_load_module(const trip_vdb_readers **out)
 {
     static const trip_vdb_host host = { TRIP_VERSION,           (trip_fail),
                                         trip_budget_take,       trip_budget_release,
@@ -56,10 +55,11 @@ static int load_module(const trip_volume_reader **out)
 static int open_vdb(const char *path, const trip_volume_params *params, trip_budget *budget,
                     trip_volume_info *info, void **out)
 {
-    const trip_volume_reader *module = NULL;
-    int status = load_module(&module);
+    const trip_vdb_readers *readers = NULL;
+    int status = trip_vdb_load_module(&readers);
     if (status)
         return status;
+    const trip_volume_reader *module = readers->volumes;
     state *s = malloc(sizeof *s);
     if (!s)
         return trip_fail(TRIP_ERROR, "read", path, "out of memory");
@@ -116,6 +116,12 @@ const trip_volume_reader trip_read_vdb = {
 };
 
 #else
+
+int trip_vdb_load_module(const trip_vdb_readers **out)
+{
+    *out = NULL;
+    return trip_fail(TRIP_ERROR, "read", MODULE, "this program was built without OpenVDB");
+}
 
 static int refuse(const char *path, const trip_volume_params *params, trip_budget *budget,
                   trip_volume_info *info, void **state)

@@ -7,13 +7,15 @@
 /* The program passes the same table each time. */
 static const trip_vdb_host *_Atomic host;
 
-__attribute__((visibility("default"))) const trip_volume_reader *
+static const trip_vdb_readers readers = { &trip_vdb_reader, &trip_vdb_points_reader };
+
+__attribute__((visibility("default"))) const trip_vdb_readers *
 trip_vdb_module(const trip_vdb_host *program)
 {
     if (strcmp(program->version, TRIP_VERSION) != 0)
         return NULL;
     host = program;
-    return &trip_vdb_reader;
+    return &readers;
 }
 
 /* The program's functions under the names that the module calls. */

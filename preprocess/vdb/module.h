@@ -8,6 +8,7 @@
 
 #include <stddef.h>
 
+#include "point.h"
 #include "report.h"
 #include "volume_reader.h"
 
@@ -25,14 +26,41 @@ typedef struct trip_vdb_host {
     int (*interrupted)(void);
 } trip_vdb_host;
 
+/* A grid of points. */
+typedef struct trip_vdb_points_info {
+    char grid[128];      /* its name */
+    char extras[1024];   /* names of attributes that are not read */
+    char comments[256];  /* the program that wrote the file */
+    unsigned attributes; /* TRIP_POINT_NORMAL and so on; colours are as in the file */
+} trip_vdb_points_info;
+
+/* Reads the first grid of points of a file. Failures are reported. */
+typedef struct trip_vdb_point_reader {
+    int (*open)(const char *path, trip_vdb_points_info *info, void **out);
+    /* Reads up to `room` points into zeroed memory. *got_out is 0 only at the end. */
+    int (*read)(void *state, trip_point *out, size_t room, size_t *got_out);
+    int (*rewind)(void *state);
+    void (*close)(void *state);
+} trip_vdb_point_reader;
+
+typedef struct trip_vdb_readers {
+    const trip_volume_reader *volumes;
+    const trip_vdb_point_reader *points;
+} trip_vdb_readers;
+
 /* The module's only symbol, TRIP_VDB_ENTRY. Returns NULL for another version. The module keeps the
  * pointer to the table. */
-typedef const trip_volume_reader *(*trip_vdb_entry_point)(const trip_vdb_host *host);
+typedef const trip_vdb_readers *(*trip_vdb_entry_point)(const trip_vdb_host *host);
 #define TRIP_VDB_ENTRY "trip_vdb_module"
-const trip_volume_reader *trip_vdb_module(const trip_vdb_host *host);
+const trip_vdb_readers *trip_vdb_module(const trip_vdb_host *host);
 
 /* Only within the module. */
-extern const trip_volume_reader trip_vdb_reader; /* read_vdb.cpp */
+extern const trip_volume_reader trip_vdb_reader;           /* read_vdb.cpp */
+extern const trip_vdb_point_reader trip_vdb_points_reader; /* vdb_points.cpp */
+
+/* Only outside of the module: loads it, unless it is loaded already. Reports a failure. It is never
+ * closed. */
+int trip_vdb_load_module(const trip_vdb_readers **out);
 
 #ifdef __cplusplus
 }

@@ -19,6 +19,7 @@
 #include "module.h"
 #include "report.h"
 #include "vdb_grid.h"
+#include "vdb_transform.h"
 
 namespace
 {
@@ -98,19 +99,6 @@ const trip_vdb_entry &choose_grid(trip_vdb_stream &is, const trip_vdb_contents &
     return fog ? *fog : *first;
 }
 
-openvdb::math::Transform::Ptr read_transform(trip_vdb_stream &is)
-{
-    int64_t start = is.tellg();
-    is.get_string(1024); /* the transform's name; the library does not check its length */
-    is.seekg(start);
-    auto transform = openvdb::math::Transform::createLinearTransform();
-    transform->read(is);
-    if (!transform->isLinear())
-        throw trip_vdb_error("its voxels lie in a frustum, which cannot be drawn: resample "
-                             "the grid");
-    return transform;
-}
-
 /* Returns the map from (i, j, k), counted from `lo`, to world space. OpenVDB's matrices act on row
  * vectors. */
 trip_affine index_to_world(const openvdb::math::Transform &transform, const int32_t lo[3])
@@ -159,7 +147,7 @@ void seek_tree(trip_vdb_stream &is, const trip_vdb_contents &contents, const tri
         if (other.unique_name == entry.parent && other.parent.empty() && other.type == entry.type &&
             other.half == entry.half) {
             head.compression = trip_vdb_read_head(is, contents, other).compression;
-            read_transform(is);
+            trip_vdb_read_transform(is);
             return;
         }
     throw trip_vdb_error("is corrupt: grid \"" + entry.name +
@@ -228,7 +216,7 @@ int open_vdb(const char *path, const trip_volume_params *params, trip_budget *bu
         const trip_vdb_entry &entry =
             params->grid ? find_grid(contents, params->grid) : choose_grid(is, contents);
         trip_vdb_head head = trip_vdb_read_head(is, contents, entry);
-        auto transform = read_transform(is);
+        auto transform = trip_vdb_read_transform(is);
         auto conversion = choose_conversion(head, entry, params->level_set, *transform);
         seek_tree(is, contents, entry, head);
         state->grid = trip_vdb_load(state->fd, is, contents, head, entry, conversion, budget);

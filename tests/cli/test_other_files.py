@@ -64,12 +64,6 @@ VERTICES = "element vertex 3", "property float x", "property float y", "property
 
 # name, contents, texts of the line
 FILES = [
-    ("a.ply", ply(*VERTICES, "element face 1", "property list uchar int vertex_indices"),
-     "a mesh (PLY) of 3 vertices", "MeshLab"),
-    ("b.ply", ply(*VERTICES), "a cloud of 3 points (PLY)", "CloudCompare"),
-    ("d.ply.gz", gzip.compress(ply(*VERTICES)), "a cloud of 3 points (PLY)", "CloudCompare"),
-    ("e.ply.bz2", bz2.compress(ply(*VERTICES)), "a cloud of 3 points (PLY)", "CloudCompare"),
-    ("no-suffix", ply(*VERTICES), "a cloud of 3 points (PLY)", "CloudCompare"),
     ("a.stl", b"solid a\nfacet normal 0 0 1\nouter loop\n", "a mesh (STL)", "MeshLab"),
     ("binary", bytes(80) + struct.pack("<I", 2) + bytes(100), "a mesh (STL)", "MeshLab"),
     ("a.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "a mesh (OBJ)", "MeshLab"),
@@ -77,11 +71,6 @@ FILES = [
     ("a.off", b"OFF\n3 1 0\n", "a mesh (OFF)", "MeshLab"),
     ("a.glb", b"glTF\2\0\0\0" + bytes(20), "glTF", "Blender"),
     ("a.gltf", b'{"asset":{"version":"2.0"}}', "glTF", "Blender"),
-    ("a.las", b"LASF" + bytes(300), "LAS or LAZ", "CloudCompare"),
-    ("a.e57", b"ASTM-E57" + bytes(300), "E57", "CloudCompare"),
-    ("a.pcd", b"# .PCD v.7\nVERSION .7\nFIELDS x y z\n", "PCD", "CloudCompare"),
-    ("b.pcd", b"VERSION 0.7\nFIELDS x y z\nDATA binary\n" + bytes(40), "PCD", "CloudCompare"),
-    ("a.xyz", b"1 2 3\n4 5 6\n", "scanned points", "CloudCompare"),
     ("a.vtk", b"# vtk DataFile Version 3.0\nx\nASCII\nDATASET POLYDATA\n", "legacy VTK", "ParaView"),
     ("a.vti", b'<?xml version="1.0"?>\n<VTKFile type="ImageData" version="0.1">\n',
      "VTK XML (ImageData)", "ParaView"),
@@ -111,7 +100,7 @@ FILES = [
     ("a.pdf", b"%PDF-1.4\n%\xe2\xe3", "PDF", "not a volume"),
     ("a.mp4", b"\0\0\0\x18ftypmp42" + bytes(40), "video", "ffmpeg"),
     ("a.jpg", b"\xff\xd8\xff\xe0" + bytes(40), "JPEG", "convert"),
-    ("a.csv", b"x,y,z\n1,2,3\n4,5,6\n7,8,9\n", "table of numbers", "NRRD"),
+    ("a.csv", b"u,v,w\n1,2,3\n4,5,6\n7,8,9\n", "table of numbers", "NRRD"),
     ("a.txt", b"hello\n" * 9, "is text", "not a volume"),
     ("b.txt", b"{" + b"hello " * 900, "is text", "not a volume"),
     ("program", b"\x7fELF" + bytes(60), "a program", "not a volume"),
@@ -153,10 +142,36 @@ class OtherFiles(program.ProgramTest):
     def test_every_command_prints_the_line(self):
         program.write("a.ply", ply(*VERTICES))
         program.write("path.json", json.dumps(PATH).encode())
-        for name, says in ("a.ply", "a cloud of 3 points"), ("path.json", "--path"):
+        program.write("a.las", b"LASF" + bytes(300))
+        program.write("a.pcd", b"# .PCD v.7\nVERSION .7\nFIELDS x y z\n")
+        program.write("a.xyz", b"1 2 3\n4 5 6\n")
+        program.write("a.e57", b"ASTM-E57" + bytes(300))
+        for name, says in (("a.ply", "a cloud of 3 points"), ("a.las", "LAS or LAZ"),
+                           ("a.pcd", "PCD"), ("a.xyz", "scanned points"), ("a.e57", "E57"),
+                           ("path.json", "--path")):
             for command in ("render", name, "-o", "a.png"), ("brick", name, "-o", "a.trip"), \
                            ("view", name), ("serve", name):
                 self.leaves_nothing(1, *command, says=says)
+
+    def test_info_describes_a_cloud_of_points(self):
+        rows = ply(*VERTICES) + b"2 0 0.001\n636000.125 850000.5 -1\n"
+        faces = ply(*VERTICES, "element face 1", "property list uchar int vertex_indices") + \
+            b"2 0 0.001\n636000.125 850000.5 -1\n3 0 1 2\n"
+        for name, data in (("a.ply", rows), ("a.ply.gz", gzip.compress(rows)),
+                           ("a.ply.bz2", bz2.compress(rows)), ("no-suffix", rows), ("m.ply", faces)):
+            program.write(name, data)
+            done = json.loads(self.works("info", name, "--json").stdout)
+            self.assertEqual(done["points"], 3)
+            self.assertEqual(done["bounds"], [[0, 0, -1], [636000.125, 850000.5, 0.001]])
+            text = self.works("info", name).stdout.decode()
+            for line in (f"cloud        {name}", "format       PLY, text", "points       3",
+                         "attributes   positions only",
+                         "bounds       x 0 to 636000.125, y 0 to 850000.5, z -1 to 0.001"):
+                self.assertIn(line + "\n", text)
+            self.assertEqual("faces are ignored" in text, name == "m.ply")
+            os.remove(name)
+        program.write("a.ply", rows)
+        self.fails(2, "info", "a.ply", "--spacing", "1,1,1", says="cloud of points")
 
     def test_damaged_gaussian_scenes_are_refused_with_their_names(self):
         for name, data in DAMAGED_SCENES:
