@@ -168,7 +168,7 @@ static void describe(const flying *m)
     char text[64];
     cJSON_AddStringToObject(settings, "data_set", o->input);
     const triptych_scene *scene = &m->flyer.opened.scene;
-    if (m->flyer.opened.is_scene) {
+    if (m->flyer.opened.kind) {
         cJSON_AddNumberToObject(settings, "gaussians", (double)scene->gaussians);
         cJSON_AddNumberToObject(settings, "stored_bytes", (double)scene->bytes);
     } else {

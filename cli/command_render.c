@@ -139,19 +139,14 @@ static bool places_objects(const drawing *d)
 static int check_objects(const drawing *d)
 {
     const render_options *o = &d->o;
-    unsigned scenes = 0;
-    for (unsigned i = 0; i < d->placed.count; i++)
-        scenes += triptych_is_gaussians(d->t, d->placed.given[i].path) != 0;
-    const bool mixed = scenes && scenes < d->placed.count;
-    int status = mixed ? 0 : draw_settings_check_kind(&o->settings, &o->resources, scenes > 0);
+    int status =
+        placed_input_check(&d->placed, d->t, &o->settings, &o->resources, &o->function);
     if (!status && o->quality.error > 0)
-        status = trip_option_fail("--error", "does not apply to several objects in one picture");
+        status = trip_option_fail("--error", TRIP_NOT_OF_OBJECTS);
     if (!status && o->field == RENDER_FIELD_SOURCE)
         status = trip_option_fail("--field", "source does not apply to objects with places");
     if (!status && o->heat)
         status = trip_option_fail("--emission", "does not apply to objects with places");
-    if (!status && scenes == d->placed.count && (o->function.name || o->function.window > 0))
-        status = library_fail_scene_option(o->function.name ? "tf" : "window");
     return status;
 }
 

@@ -140,7 +140,7 @@ static int parse_options(view_command *o, int argc, char **argv)
                 } };
     const command_line c = {
         .args_doc = "[VOLUME|NAME.trip...]",
-        .doc = "Shows volumes, Gaussian scenes or data sets in a window, where you turn, cut, "
+        .doc = "Shows volumes, Gaussian scenes, data sets or scene files in a window, where you turn, cut, "
                "classify and fly "
                "through them. A moving view is drawn with as little detail as keeps to --fps. At "
                "rest the picture equals the picture of `triptych render`, bit for bit. A volume is "
@@ -210,6 +210,7 @@ int trip_command_view(int argc, char **argv)
     o.params.check_output = check_output;
     o.params.check_user = &o.read;
     o.params.find = viewed_volume_find;
+    o.params.open = viewed_volume_open;
     o.params.make = viewed_volume_make;
     o.params.release = viewed_volume_release;
     if (!status)

@@ -108,6 +108,34 @@ int placed_input_list(placed_input *p, triptych *t, const char *const *paths, un
     return status ? status : find_all(p, t, paths[0], options);
 }
 
+/* Returns what the picture shows. */
+static draw_kind picture_of(const placed_input *p, unsigned scenes)
+{
+    static const triptych_object unplaced = { .matrix = TRIPTYCH_UNPLACED };
+    const bool placed = p->count > 1 || p->given->function ||
+                        memcmp(p->given->matrix, unplaced.matrix, sizeof unplaced.matrix) != 0;
+    return scenes == p->count ? DRAW_SCENES : placed ? DRAW_OBJECTS : DRAW_A_VOLUME;
+}
+
+int placed_input_check(const placed_input *p, triptych *t, const draw_settings *settings,
+                       const triptych_resources *resources,
+                       const triptych_transfer_function *function)
+{
+    static const triptych_object unplaced = { .matrix = TRIPTYCH_UNPLACED };
+    unsigned scenes = 0;
+    for (unsigned i = 0; i < p->count; i++)
+        scenes += triptych_is_gaussians(t, p->given[i].path) != 0;
+    const draw_kind kind = picture_of(p, scenes);
+    const bool moved = p->count > 1 ||
+                       memcmp(p->given->matrix, unplaced.matrix, sizeof unplaced.matrix) != 0;
+    int status = draw_settings_check_kind(settings, resources, kind);
+    if (!status && settings->scene.order == TRIPTYCH_ORDER_SHEETS && moved)
+        status = trip_option_fail("--order", "sheets draws one scene alone, where it lies");
+    if (!status && kind == DRAW_SCENES && (function->name || function->window > 0))
+        status = library_fail_scene_option(function->name ? "tf" : "window");
+    return status;
+}
+
 int placed_input_open(const placed_input *p, triptych *t, const char *path,
                       const triptych_resources *resources)
 {

@@ -1,9 +1,11 @@
 /* Several objects in one picture: finds or makes their data sets in the cache, and opens them
- * together. Main thread only, except placed_input_open(). */
+ * together. One thread at a time. */
 #ifndef TRIP_CLI_PLACED_INPUT_H
 #define TRIP_CLI_PLACED_INPUT_H
 
 #include "cached_volume.h"
+
+#define TRIP_NOT_OF_OBJECTS "does not apply to several objects in one picture"
 
 /* Zeroed before its first use. Without objects, one data set is the input. */
 typedef struct placed_input {
@@ -24,6 +26,11 @@ int placed_input_read(placed_input *p, triptych *t, const char *path,
  * ';' between them; NULL places nothing. */
 int placed_input_list(placed_input *p, triptych *t, const char *const *paths, unsigned count,
                       const char *places, const triptych_brick_options *options);
+/* Checks that the settings and the function apply to the objects in `given`. Settings for volumes do
+ * not concern scenes beside them, and the reverse. */
+int placed_input_check(const placed_input *p, triptych *t, const draw_settings *settings,
+                       const triptych_resources *resources,
+                       const triptych_transfer_function *function);
 /* Opens the objects, or the data set `path` if there are none. Any thread. */
 int placed_input_open(const placed_input *p, triptych *t, const char *path,
                       const triptych_resources *resources);

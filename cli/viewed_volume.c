@@ -64,11 +64,44 @@ static int check_volume(const viewed_volume *s, triptych *t, const char *volume)
     return status;
 }
 
+/* Checks one object of a scene file. */
+static int check_object(const viewed_volume *s, triptych *t, const triptych_object *o,
+                        const triptych_resources *resources)
+{
+    viewed_volume one = { .options = s->options, .function = o->function ? o->function : s->function };
+    if (triptych_is_gaussians(t, o->path))
+        one.function = NULL;
+    if (cached_volume_wanted(o->path))
+        return check_volume(&one, t, o->path);
+    const int status = triptych_open(t, o->path, resources);
+    triptych_close(t);
+    return status;
+}
+
+static int check_objects(const viewed_volume *s, triptych *t, const char *input,
+                         const triptych_resources *resources)
+{
+    placed_input p = { 0 };
+    int status = triptych_read_scene_file(t, input, &p.given, &p.count);
+    if (!status)
+        status = library_check_scene_options(&s->options);
+    if (!status && s->measured)
+        status = trip_option_fail("--error", TRIP_NOT_OF_OBJECTS);
+    if (!status)
+        status = placed_input_check(&p, t, s->settings, resources,
+                                    &(triptych_transfer_function){ .name = s->function });
+    for (unsigned i = 0; i < p.count && !status; i++)
+        if (!i || strcmp(p.given[i].path, p.given[i - 1].path) != 0 || p.given[i].function)
+            status = check_object(s, t, &p.given[i], resources);
+    placed_input_close(&p);
+    return status;
+}
+
 int viewed_volume_check(const viewed_volume *s, triptych *t, const char *input,
                         const triptych_resources *resources)
 {
     if (triptych_is_scene_file(input))
-        return library_fail_scene(input);
+        return check_objects(s, t, input, resources);
     const triptych_transfer_function function = { .name = s->function };
     const bool is_scene = triptych_is_gaussians(t, input) != 0;
     int status = library_check_kind(t, input, s->settings, resources, &function);
@@ -171,6 +204,10 @@ int viewed_volume_find(void *user, triptych *t, const char *input, bool keep_all
 {
     viewed_volume *s = user;
     *path = input;
+    if (triptych_is_scene_file(input)) {
+        const cached_wish wish = wish_of(s, input, false);
+        return placed_input_read(&s->placed, t, input, &wish.options);
+    }
     if (!keep_all && !cached_volume_wanted(input))
         return 0;
     int status = s->samples && !keep_all ? is_large(s, t, input) : 0;
@@ -187,11 +224,22 @@ void viewed_volume_release(void *user)
 {
     viewed_volume *s = user;
     cached_volume_close(&s->cached);
+    placed_input_close(&s->placed);
+}
+
+int viewed_volume_open(void *user, triptych *t, const char *path,
+                       const triptych_resources *resources)
+{
+    const viewed_volume *s = user;
+    return placed_input_open(&s->placed, t, path, resources);
 }
 
 int viewed_volume_make(void *user, triptych *t, const char *input, bool keep_all)
 {
     cached_volume made = { .hold = -1 };
+    if (triptych_is_scene_file(input))
+        return trip_fail(TRIP_USAGE, "brick", input,
+                         "is a scene file; brick its volumes with --keep-all and name the data sets");
     const int status = open_volume(user, &made, t, input, keep_all);
     cached_volume_close(&made);
     return status;

@@ -6,6 +6,7 @@
 #include <stdbool.h>
 
 #include "cached_volume.h"
+#include "placed_input.h"
 #include "quality_options.h"
 
 typedef struct viewed_volume {
@@ -19,6 +20,7 @@ typedef struct viewed_volume {
     bool samples; /* true: for a large volume that is not in the cache, first finds a small data set
                      from samples */
     cached_volume cached; /* zeroed before its first use */
+    placed_input placed;  /* of a scene file; zeroed before its first use */
 } viewed_volume;
 
 /* Takes the settings of --error, and selects the coarse levels for bricking. `q` must outlive *s.
@@ -28,7 +30,7 @@ int viewed_volume_choose(viewed_volume *s, quality_options *q, const char *input
 
 /* Checks the inputs before anything is shown. All settings must apply to a volume or to a Gaussian
  * scene. A data set must open and accept the transfer function. A volume must exist in a known
- * format, and its transfer function must load. The context has no data set open before the call or
+ * format, and its transfer function must load. This holds for each object of a scene file. The context has no data set open before the call or
  * after it. */
 int viewed_volume_check(const viewed_volume *s, triptych *t, const char *input,
                         const triptych_resources *resources);
@@ -37,6 +39,9 @@ int viewed_volume_check(const viewed_volume *s, triptych *t, const char *input,
 int viewed_volume_find(void *user, triptych *t, const char *input, bool keep_all, bool *small,
                        const char **path);
 void viewed_volume_release(void *user);
+/* Callback for trip_frames_params.open: opens a data set, or the objects of a scene file. */
+int viewed_volume_open(void *user, triptych *t, const char *path,
+                       const triptych_resources *resources);
 /* Callback for trip_maker_params.make, in a thread of its own. Makes the data set that
  * viewed_volume_find() returns next, with all values or only the visible ones. */
 int viewed_volume_make(void *user, triptych *t, const char *input, bool keep_all);

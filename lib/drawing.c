@@ -631,6 +631,8 @@ int triptych_await(triptych *t, uint64_t timeout_ns)
     int status = check_drawing(t);
     if (!status && !trip_context_draws_scene(t))
         trip_frame_await(&t->drawing, timeout_ns);
+    if (!status && t->mixed)
+        trip_context_await_mixed(t, timeout_ns);
     if (!status && trip_interrupted())
         status = trip_fail(TRIP_INTERRUPTED, "render", t->name, "interrupted");
     return trip_context_leave(before, status);

@@ -327,13 +327,23 @@ static const uint64_t of_both =
     ROW(BACKGROUND) | ROW(CLIP_BOX) | ROW(CLIP_PLANE) | ROW(EARLY_TERMINATION) | ROW(FOOTPRINT) |
     ROW(SAMPLES) | ROW(DEPTH) | ROW(NORMALISE) | ROW(METHOD) | ROW(H) | ROW(LOD) | ROW(TOLERANCE);
 
-/* A scene does not have these choices, for these reasons. */
+static const uint64_t not_of_objects = ROW(SHEET) | ROW(DEPTH) | ROW(LOD) | ROW(MAX_BYTES) |
+                                      ROW(MAX_MS) | ROW(SHOW) | ROW(COUNT) | ROW(TEMPERATURE);
+
+#define NOT_OF_OBJECTS "does not apply to a picture with volumes beside other objects"
+
+/* These kinds do not have these choices, for these reasons. */
 static const struct choice {
+    draw_kind kind;
     int row, choice; /* index in trip_option.choices */
     const char *why;
-} not_of_scenes[] = {
-    { DRAW_FOOTPRINT, TRIPTYCH_FOOTPRINT_FIXED - 1, "fixed does not apply to Gaussian scenes" },
-    { DRAW_METHOD, TRIPTYCH_METHOD_IMAGE - 1, "image does not apply to Gaussian scenes" },
+} missing[] = {
+    { DRAW_SCENES, DRAW_FOOTPRINT, TRIPTYCH_FOOTPRINT_FIXED - 1,
+      "fixed does not apply to Gaussian scenes" },
+    { DRAW_SCENES, DRAW_METHOD, TRIPTYCH_METHOD_IMAGE - 1,
+      "image does not apply to Gaussian scenes" },
+    { DRAW_OBJECTS, DRAW_ORDER, TRIPTYCH_ORDER_LISTS - 1, "lists " NOT_OF_OBJECTS },
+    { DRAW_OBJECTS, DRAW_ORDER, TRIPTYCH_ORDER_SHEETS - 1, "sheets " NOT_OF_OBJECTS },
 };
 
 /* The order by depth has one layer, so nothing is merged. */
@@ -342,32 +352,37 @@ static bool has_one_layer(const draw_settings *s)
     return s->scene.order <= TRIPTYCH_ORDER_DEPTH;
 }
 
-static uint64_t rows_of_kind(const draw_settings *s, bool is_scene)
+static uint64_t rows_of_kind(const draw_settings *s, draw_kind kind)
 {
     const uint64_t merging = ROW(METHOD) | ROW(H);
-    return !is_scene ? ~of_scenes : (of_scenes | of_both) & (has_one_layer(s) ? ~merging : ~0ULL);
+    if (kind == DRAW_A_VOLUME)
+        return ~of_scenes;
+    if (kind == DRAW_OBJECTS)
+        return ~not_of_objects;
+    return (of_scenes | of_both) & (has_one_layer(s) ? ~merging : ~0ULL);
 }
 
-bool draw_settings_applies(const draw_settings *s, int row, bool is_scene)
+bool draw_settings_applies(const draw_settings *s, int row, draw_kind kind)
 {
-    return rows_of_kind(s, is_scene) >> row & 1;
+    return rows_of_kind(s, kind) >> row & 1;
 }
 
-bool draw_settings_choice_applies(int row, int choice, bool is_scene)
+bool draw_settings_choice_applies(int row, int choice, draw_kind kind)
 {
-    for (size_t i = 0; is_scene && i < sizeof not_of_scenes / sizeof *not_of_scenes; i++)
-        if (not_of_scenes[i].row == row && not_of_scenes[i].choice == choice)
+    for (size_t i = 0; i < sizeof missing / sizeof *missing; i++)
+        if (missing[i].kind == kind && missing[i].row == row && missing[i].choice == choice)
             return false;
     return true;
 }
 
-/* Returns the first choice of the settings that scenes do not have, or NULL. */
-static const struct choice *find_choice_not_of_scenes(const draw_settings *s)
+/* Returns the first choice of the settings that the kind does not have, or NULL. */
+static const struct choice *find_missing(const draw_settings *s, draw_kind kind)
 {
-    for (size_t i = 0; i < sizeof not_of_scenes / sizeof *not_of_scenes; i++) {
-        const trip_option *row = &draw_settings_table.rows[not_of_scenes[i].row];
-        if (*(const int *)((const char *)s + row->at) - row->first == not_of_scenes[i].choice)
-            return &not_of_scenes[i];
+    for (size_t i = 0; i < sizeof missing / sizeof *missing; i++) {
+        const trip_option *row = &draw_settings_table.rows[missing[i].row];
+        if (missing[i].kind == kind &&
+            *(const int *)((const char *)s + row->at) - row->first == missing[i].choice)
+            return &missing[i];
     }
     return NULL;
 }
@@ -382,20 +397,24 @@ static int check_resources_of_scenes(const triptych_resources *r)
     return 0;
 }
 
-int draw_settings_check_kind(const draw_settings *s, const triptych_resources *r, bool is_scene)
+int draw_settings_check_kind(const draw_settings *s, const triptych_resources *r, draw_kind kind)
 {
-    const uint64_t given = given_rows(s);
-    const struct choice *choice = is_scene ? find_choice_not_of_scenes(s) : NULL;
-    const struct rule of_kind = {
-        .given = is_scene ? ~(of_scenes | of_both) : of_scenes,
-        .why = is_scene ? "does not apply to Gaussian scenes" : "applies to Gaussian scenes only",
+    static const struct rule of_kinds[] = {
+        [DRAW_A_VOLUME] = { .given = of_scenes, .why = "applies to Gaussian scenes only" },
+        [DRAW_SCENES] = { .given = ~(of_scenes | of_both),
+                          .why = "does not apply to Gaussian scenes" },
+        [DRAW_OBJECTS] = { .given = not_of_objects, .why = NOT_OF_OBJECTS },
     };
+    /* objects are drawn at the finest level */
+    const bool finest = kind == DRAW_OBJECTS && s->lod.voxel_px == TRIPTYCH_ZERO;
+    const uint64_t given = given_rows(s) & ~(finest ? ROW(LOD) : 0);
+    const struct choice *choice = find_missing(s, kind);
     const struct rule of_layers = {
-        .given = ~rows_of_kind(s, is_scene),
+        .given = ~rows_of_kind(s, kind),
         .why = "does not apply to scenes with --order depth, which have nothing to merge",
     };
-    if (of_kind.given & given)
-        return fail_rule(&of_kind, given);
+    if (of_kinds[kind].given & given)
+        return fail_rule(&of_kinds[kind], given);
     if (choice) {
         char option[64];
         snprintf(option, sizeof option, "--%s", draw_settings_table.rows[choice->row].name);
@@ -403,20 +422,23 @@ int draw_settings_check_kind(const draw_settings *s, const triptych_resources *r
     }
     if (of_layers.given & given)
         return fail_rule(&of_layers, given);
-    if (is_scene && s->clip.box && s->clip.box_of_voxels)
-        return trip_option_fail("--clip-box", "voxels: does not apply to Gaussian scenes");
-    return is_scene ? check_resources_of_scenes(r) : 0;
+    if (kind != DRAW_A_VOLUME && s->clip.box && s->clip.box_of_voxels)
+        return trip_option_fail("--clip-box",
+                                kind == DRAW_SCENES
+                                    ? "voxels: does not apply to Gaussian scenes"
+                                    : "voxels: " NOT_OF_OBJECTS);
+    return kind == DRAW_SCENES ? check_resources_of_scenes(r) : 0;
 }
 
-void draw_settings_drop_kind(draw_settings *s, bool is_scene)
+void draw_settings_drop_kind(draw_settings *s, draw_kind kind)
 {
     const struct choice *choice;
-    while (is_scene && (choice = find_choice_not_of_scenes(s)))
+    while ((choice = find_missing(s, kind)))
         draw_settings_unset(s, choice->row);
     for (int i = 0; i < DRAW_OPTIONS; i++)
-        if (!draw_settings_applies(s, i, is_scene))
+        if (!draw_settings_applies(s, i, kind))
             draw_settings_unset(s, i);
-    if (is_scene && s->clip.box_of_voxels)
+    if (kind != DRAW_A_VOLUME && s->clip.box_of_voxels)
         draw_settings_unset(s, DRAW_CLIP_BOX);
 }
 

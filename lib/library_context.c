@@ -284,12 +284,14 @@ static int check_resources(const triptych_resources *r)
     return known ? 0 : trip_fail(TRIP_USAGE, "render", "resources", "unknown renderer or engine");
 }
 
-/* Returns whether the objects are more than scenes and one volume that stays where it is. */
+/* Returns whether the objects are more than scenes, and more than one volume that stays where it is
+ * and has no function of its own. */
 static bool places_volumes(const triptych_object *objects, unsigned count)
 {
     static const triptych_object unplaced = { .matrix = TRIPTYCH_UNPLACED };
     const bool placed =
-        count > 1 || memcmp(objects->matrix, unplaced.matrix, sizeof unplaced.matrix) != 0;
+        count > 1 || objects->function ||
+        memcmp(objects->matrix, unplaced.matrix, sizeof unplaced.matrix) != 0;
     bool volumes = false;
     for (unsigned i = 0; i < count; i++)
         volumes |= !trip_gaussian_set_is(objects[i].path);

@@ -216,10 +216,13 @@ int trip_context_open_mixed(triptych *t, const triptych_object *objects, unsigne
 void trip_context_close_mixed(triptych *t);
 void trip_context_cancel_mixed(triptych *t);
 int trip_context_use_mixed_function(triptych *t, const triptych_transfer_function *f);
+unsigned trip_context_count_mixed(const triptych *t);
 /* Adds the volumes to a box. The first object sets the directions. */
 void trip_context_add_mixed(const triptych *t, trip_view_object *object);
 int trip_context_begin_mixed(triptych *t, int side);
 int trip_context_step_mixed(triptych *t, uint64_t deadline_ns);
+/* Waits until the volume of the begun frame has data to draw. */
+void trip_context_await_mixed(const triptych *t, uint64_t timeout_ns);
 int trip_context_take_mixed(triptych *t, float *rgba);
 void trip_context_end_mixed(triptych *t);
 void trip_context_add_mixed_stats(const triptych *t, triptych_frame_stats *stats);

@@ -33,6 +33,7 @@ struct trip_mixed {
     double cuts[TRIP_MIXTURE_CUTS_MAX];
     unsigned cut_count;
     unsigned slab, next; /* slab 0 ends at cuts[0], the last one is open; the next volume in it */
+    bool drawing;        /* the frame of volume `next` is begun */
     size_t pixels;
     trip_mixture_pixel *mixture;
     float *picture, *distances;
@@ -205,6 +206,11 @@ int trip_context_use_mixed_function(triptych *t, const triptych_transfer_functio
     return status;
 }
 
+unsigned trip_context_count_mixed(const triptych *t)
+{
+    return t->mixed ? t->mixed->count : 0;
+}
+
 void trip_context_add_mixed(const triptych *t, trip_view_object *object)
 {
     for (unsigned i = 0; i < t->mixed->count; i++) {
@@ -272,22 +278,6 @@ static int use_view(triptych *t, const volume *v, int side)
                                               }));
 }
 
-/* Refuses settings that have no meaning for several objects. */
-static int check(const triptych *t)
-{
-    const draw_settings *g = &t->given;
-    const char *what = g->all.depth                             ? "depth"
-                       : g->scene.order == TRIPTYCH_ORDER_LISTS ? "order lists"
-                       : g->clip.box && g->clip.box_of_voxels   ? "clip-box of voxels"
-                       : draw_settings_has_levels(g)            ? "lod"
-                       : g->all.show                            ? "show"
-                       : g->all.count_exactly                   ? "count"
-                                                                : NULL;
-    return what ? trip_fail(TRIP_USAGE, "render", what,
-                            "does not apply to a picture with volumes beside other objects")
-                : 0;
-}
-
 /* Returns the depths of the centres of all scenes. */
 static trip_depth_range depths_of_scenes(const triptych *t)
 {
@@ -333,9 +323,7 @@ int trip_context_begin_mixed(triptych *t, int side)
 {
     struct trip_mixed *m = t->mixed;
     trip_depth_range depths[TRIP_MIXTURE_VOLUMES_MAX];
-    int status = check(t);
-    if (!status)
-        status = take_memory(t);
+    int status = take_memory(t);
     for (unsigned i = 0; i < m->count && !status; i++) {
         volume *v = &m->volumes[i];
         status = use_settings(t, v, side);
@@ -348,6 +336,7 @@ int trip_context_begin_mixed(triptych *t, int side)
         return status;
     m->cut_count = trip_mixture_cut(depths, m->count, depths_of_scenes(t), m->cuts);
     m->slab = m->next = 0;
+    m->drawing = false;
     trip_mixture_begin(m->mixture, m->pixels);
     return 0;
 }
@@ -391,21 +380,48 @@ static void note_stats(volume *v)
     v->drawn.reads += before.reads;
 }
 
-/* Draws the next volume of the slab, if it reaches into it. */
-static int draw_next(triptych *t, trip_depth_range slab)
+static bool meets(const struct trip_mixed *m, const volume *v, trip_depth_range slab)
+{
+    return m->slab && m->slab < m->cut_count && trip_mixture_meet(v->depths, slab);
+}
+
+static void end_volume(struct trip_mixed *m)
+{
+    if (!m->drawing)
+        return;
+    triptych_end(m->volumes[m->next].t);
+    m->volumes[m->next].t->cut.count = 0;
+    m->drawing = false;
+}
+
+/* Draws a part of the next volume of the slab, if it reaches into it. Returns 0 at its end. */
+static int draw_next(triptych *t, trip_depth_range slab, uint64_t deadline_ns)
 {
     struct trip_mixed *m = t->mixed;
-    volume *v = &m->volumes[m->next++];
-    if (!trip_mixture_meet(v->depths, slab) || !m->slab || m->slab == m->cut_count)
+    volume *v = &m->volumes[m->next];
+    int status = 0;
+    if (!meets(m, v, slab)) {
+        m->next++;
         return 0;
-    v->t->cut = clip_of(t, v, slab);
-    const int status = keep_error(t, v, triptych_draw(v->t, m->picture));
-    v->t->cut.count = 0;
+    }
+    if (!m->drawing) {
+        v->t->cut = clip_of(t, v, slab);
+        status = triptych_begin(v->t);
+        m->drawing = !status;
+    }
+    if (!status)
+        status = triptych_step(v->t, deadline_ns);
+    if (status > 0)
+        return status;
+    if (!status)
+        status = triptych_picture(v->t, m->picture);
     if (!status)
         trip_mixture_add(m->mixture, m->picture, m->pixels);
+    end_volume(m);
     if (!status)
         note_stats(v);
-    return status;
+    m->next++;
+    return keep_error(t, v, status);
 }
 
 /* Draws the Gaussians up to the end of the slab, and composites it. */
@@ -434,7 +450,8 @@ int trip_context_step_mixed(triptych *t, uint64_t deadline_ns)
     int status = 0;
     while (!status && m->slab <= m->cut_count) {
         const trip_depth_range slab = slab_of(m);
-        status = m->next < m->count ? draw_next(t, slab) : end_slab(t, slab, deadline_ns);
+        status = m->next < m->count ? draw_next(t, slab, deadline_ns)
+                                     : end_slab(t, slab, deadline_ns);
         if (!status && trip_interrupted())
             status = trip_fail(TRIP_INTERRUPTED, "render", t->name, "interrupted");
         if (!status && t->show)
@@ -453,9 +470,17 @@ int trip_context_take_mixed(triptych *t, float *rgba)
     return 0;
 }
 
+void trip_context_await_mixed(const triptych *t, uint64_t timeout_ns)
+{
+    const struct trip_mixed *m = t->mixed;
+    if (m->drawing)
+        triptych_await(m->volumes[m->next].t, timeout_ns);
+}
+
 void trip_context_end_mixed(triptych *t)
 {
     struct trip_mixed *m = t->mixed;
+    end_volume(m);
     trip_budget *budget = t->session.budget;
     trip_budget_release(budget, m->mixture, m->pixels * sizeof *m->mixture);
     trip_budget_release(budget, m->picture, m->pixels * 4 * sizeof(float));

@@ -151,20 +151,34 @@ static void add_to_scene(const triptych *t, unsigned i, triptych_scene *out)
         out->bricks += h->brick_count[a];
 }
 
+/* Whether the picture shows one scene where it lies. */
+static bool is_alone(const triptych *t)
+{
+    return t->placed_count == 1 && t->placed->placement.identity && !t->mixed;
+}
+
 int triptych_get_scene(triptych *t, triptych_scene *out)
 {
     trip_scope *before = trip_context_enter(t);
     int status = trip_context_check_open(t);
     *out = (triptych_scene){ 0 };
-    if (!status && (!t->scene || t->mixed))
+    if (!status && !trip_context_draws_scene(t))
         status = trip_fail(TRIP_USAGE, "render", t->name, "is not a Gaussian scene");
     if (status)
         return trip_context_leave(before, status);
-    *out = (triptych_scene){ .antialiased = 1, .flat = 1, .notes = t->scene->text };
-    out->y_down = (t->scene->header.flags & TRIP_GAUSSIAN_Y_DOWN) != 0;
+    if (t->scene)
+        *out = (triptych_scene){ .antialiased = 1, .flat = 1, .notes = t->scene->text };
+    out->y_down = t->scene && t->scene->header.flags & TRIP_GAUSSIAN_Y_DOWN;
+    out->volumes = trip_context_count_mixed(t);
+    out->objects = t->placed_count + out->volumes;
+    out->moved = !is_alone(t);
     for (unsigned i = 0; i < t->placed_count; i++)
         add_to_scene(t, i, out);
     const trip_view_object object = trip_context_scene_object(t);
+    if (!t->placed_count) {
+        memcpy(out->lo, object.lo, sizeof object.lo);
+        memcpy(out->hi, object.hi, sizeof object.hi);
+    }
     memcpy(out->typical_lo, object.lo, sizeof object.lo);
     memcpy(out->typical_hi, object.hi, sizeof object.hi);
     return trip_context_leave(before, 0);
@@ -248,8 +262,7 @@ static int check_sheet(const triptych *t)
 
 static int check_sheets(const triptych *t)
 {
-    const bool one = t->placed_count == 1 && t->placed->placement.identity && !t->mixed;
-    return one || t->given.scene.order != TRIPTYCH_ORDER_SHEETS
+    return is_alone(t) || t->given.scene.order != TRIPTYCH_ORDER_SHEETS
                ? check_sheet(t)
                : trip_option_fail("--order", "sheets draws one scene alone, where it lies");
 }
@@ -257,11 +270,10 @@ static int check_sheets(const triptych *t)
 static int check(const triptych *t)
 {
     triptych_renderer r = t->resources.renderer;
-    if (t->mixed) /* some settings are for its volumes */
-        return check_sheets(t);
-    if (r == TRIPTYCH_RENDERER_INTEGRAL && draw_settings_check(&t->given, &r, false))
+    if (!t->mixed && r == TRIPTYCH_RENDERER_INTEGRAL && draw_settings_check(&t->given, &r, false))
         return TRIP_USAGE;
-    const int status = draw_settings_check_kind(&t->given, &t->resources, true);
+    const int status = draw_settings_check_kind(&t->given, &t->resources,
+                                                t->mixed ? DRAW_OBJECTS : DRAW_SCENES);
     return status ? status : check_sheets(t);
 }
 

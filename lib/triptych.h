@@ -221,17 +221,18 @@ typedef struct triptych_scene {
     /* Bounds of the centres without the outer 1 % on each side; if these are a point, bounds of the
      * Gaussians. Views fit these. */
     double typical_lo[3], typical_hi[3];
-    const char *notes; /* JSON; belongs to the data set */
+    const char *notes; /* JSON; belongs to the data set; NULL if only volumes are placed */
+    unsigned objects, volumes; /* in the picture; volumes are counted in `objects` too */
+    int moved;                 /* several objects, or one with a place of its own */
 } triptych_scene;
 
-/* Returns 1 if the open data set is a Gaussian scene. These functions do not apply to scenes, and
+/* Returns 1 if the open data set is a Gaussian scene, or if objects with places are open. These functions do not apply to scenes, and
  * fail with TRIPTYCH_USAGE: triptych_get_info(), triptych_get_list(), triptych_add(), and those
  * about values, heat and probes. */
 TRIPTYCH_API int triptych_is_scene(const triptych *t);
 /* Describes the open scene. Fails with TRIPTYCH_USAGE if a volume or nothing is open. For several
- * scenes in one picture, it sums the counts and joins the bounds, and gives the first scene's
- * notes.
- */
+ * objects in one picture, it sums the counts of the scenes, joins the bounds of all objects, and
+ * gives the first scene's notes. */
 TRIPTYCH_API int triptych_get_scene(triptych *t, triptych_scene *out);
 
 /* ---- several data sets in one picture ---- */

@@ -24,6 +24,7 @@ typedef struct trip_serve_params {
     /* As in frames.h; NULL means that the input is a data set. */
     int (*find)(void *user, triptych *t, const char *input, bool keep_all, bool *small,
                 const char **path);
+    int (*open)(void *user, triptych *t, const char *path, const triptych_resources *resources);
     void (*release)(void *user);
     void *find_user;
 } trip_serve_params;

@@ -103,6 +103,7 @@ trip_session *trip_session_start(const trip_serve_params *p)
                                                          .frames_per_second = p->frames_per_second,
                                                          .choices_folder = p->choices_folder,
                                                          .find = p->find,
+                                                         .open = p->open,
                                                          .release = p->release,
                                                          .user = p->find_user,
                                                          .wake = wake,
@@ -214,7 +215,7 @@ bool trip_session_set_function(trip_session *s, const char *name)
         return false;
     pthread_mutex_lock(&s->lock);
     const trip_document *d = trip_viewer_document(&s->viewer);
-    const bool applies = d && !d->is_scene;
+    const bool applies = d && !d->kind;
     if (applies)
         trip_viewer_set_function(&s->viewer, known);
     trip_viewer_tick(&s->viewer, 0);
@@ -276,7 +277,7 @@ static bool applies(const trip_document *d, const char *name, const draw_setting
 {
     draw_settings kept = *s;
     bool all = true;
-    draw_settings_drop_kind(&kept, d->is_scene);
+    draw_settings_drop_kind(&kept, d->kind);
     for (int i = 0; i < DRAW_OPTIONS; i++) {
         const trip_option *row = &draw_settings_table.rows[i];
         all &= strcmp(row->name, name) || trip_option_same(row, &kept, s);
@@ -335,10 +336,10 @@ bool trip_session_set(trip_session *s, const char *name, const char *value)
     trip_document *d = trip_viewer_document(&s->viewer);
     if (d && !strcmp(name, "opacity"))
         good = set_number(&d->opacity_scale, value, 1e-3, 1e3);
-    else if (d && !d->is_scene && !strcmp(name, "light"))
+    else if (d && !d->kind && !strcmp(name, "light"))
         good = set_light(d, value);
     else if (d)
-        good = (!d->is_scene && set_effect(d, name, value)) || set_setting(d, name, value);
+        good = (!d->kind && set_effect(d, name, value)) || set_setting(d, name, value);
     s->viewer.changed |= good;
     trip_viewer_tick(&s->viewer, 0);
     pthread_mutex_unlock(&s->lock);
@@ -502,7 +503,7 @@ static void add_scene(cJSON *root, const trip_document *d, const draw_settings *
     cJSON *rows = cJSON_AddArrayToObject(scene, "applies");
     cJSON_AddItemToArray(rows, cJSON_CreateString("opacity"));
     for (int i = 0; i < DRAW_OPTIONS; i++)
-        if (draw_settings_applies(&d->settings, i, true))
+        if (draw_settings_applies(&d->settings, i, d->kind))
             cJSON_AddItemToArray(rows, cJSON_CreateString(draw_settings_table.rows[i].name));
 }
 
@@ -510,10 +511,10 @@ static void add_scene(cJSON *root, const trip_document *d, const draw_settings *
 static void add_bounds(cJSON *root, const trip_document *d)
 {
     triptych_clip all = { 0 };
-    if (d->is_scene)
+    if (d->kind)
         trip_clipping_box_of_all(&all, &d->info, true);
-    const double *corners[2] = { d->is_scene ? all.box_lo : d->info.lo,
-                                 d->is_scene ? all.box_hi : d->info.hi };
+    const double *corners[2] = { d->kind ? all.box_lo : d->info.lo,
+                                 d->kind ? all.box_hi : d->info.hi };
     cJSON *bounds = cJSON_AddArrayToObject(root, "bounds");
     for (int i = 0; i < 6; i++)
         cJSON_AddItemToArray(bounds, cJSON_CreateNumber(corners[i / 3][i % 3]));
@@ -539,7 +540,7 @@ char *trip_session_status(trip_session *s)
     const draw_settings settings = d ? trip_viewer_settings(d) : s->viewer.settings;
     char effects[256];
     trip_effects_say(&settings, d ? trip_viewer_heat(d) : NULL, effects, sizeof effects);
-    const bool of_volume = d && !d->is_scene;
+    const bool of_volume = d && !d->kind;
     cJSON_AddBoolToObject(root, "opened", d && d->opened);
     if (d && d->opened)
         add_bounds(root, d);
@@ -547,7 +548,7 @@ char *trip_session_status(trip_session *s)
         add_light(root, d);
     if (of_volume)
         add_switches(root, d);
-    if (d && d->is_scene)
+    if (d && d->kind)
         add_scene(root, d, &settings, &status);
     const char *function = d ? trip_viewer_function(d) : NULL;
     cJSON_AddStringToObject(root, "function", function ? function : "");

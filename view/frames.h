@@ -37,6 +37,8 @@ typedef struct trip_frames_params {
      * Failures are reported in the context or the thread's scope. */
     int (*find)(void *user, triptych *t, const char *input, bool keep_all, bool *small,
                 const char **path);
+    /* Called by the drawing thread. Opens what find() found. NULL means triptych_open(). */
+    int (*open)(void *user, triptych *t, const char *path, const triptych_resources *resources);
     void (*release)(void *user);
     void *user;
 } trip_frames_params;
@@ -73,7 +75,7 @@ typedef struct trip_opened {
     bool first;           /* just opened; otherwise only navigation and function are set */
     bool small;           /* as find() set it */
     bool cold;            /* the heat data set failed to open; drawn without emission */
-    bool is_scene;        /* a Gaussian scene: `info` has only the bounds that views fit */
+    draw_kind kind;       /* unless it is a volume, `info` has only the bounds that views fit */
     triptych_info info;   /* notes is NULL */
     triptych_scene scene; /* notes is NULL; zero for a volume */
     triptych_histogram histogram;

@@ -44,7 +44,7 @@ struct trip_frames {
     bool small;                 /* as find() set it */
     bool cold;                  /* the heat data set failed to open */
     bool open, announced, warm; /* a data set is open; the window knows; a frame was drawn */
-    bool is_scene;              /* the open data set is a Gaussian scene */
+    draw_kind kind;             /* of the open data set */
     bool frugal;                /* keeps no pages between frames */
     bool plain;                 /* moving views have no coarse levels */
     bool by_values;             /* has coarse levels for post only: moving views use post */

@@ -180,6 +180,14 @@ static bool has_levels(triptych *t, triptych_classify classify)
     return triptych_count_levels(t, classify, &levels) == 0 && levels > 0;
 }
 
+static draw_kind kind_of(triptych *t)
+{
+    triptych_scene scene;
+    if (!triptych_is_scene(t) || triptych_get_scene(t, &scene))
+        return DRAW_A_VOLUME;
+    return scene.volumes ? DRAW_OBJECTS : DRAW_SCENES;
+}
+
 static int open_data(trip_frames *f)
 {
     f->frugal &= f->document == f->now.document;
@@ -199,31 +207,36 @@ static int open_data(trip_frames *f)
     show_stage(f, "open", 0);
     if (p->find)
         status = p->find(p->user, f->t, w->input, w->keep_all, &f->small, &f->source);
+    const triptych_resources resources = { .memory_bytes = p->memory_bytes,
+                                           .threads = p->threads,
+                                           .renderer = p->renderer,
+                                           .engine = p->engine,
+                                           .keep_pages = !f->frugal,
+                                           .choices_folder = p->choices_folder,
+                                           .choose_later = 1,
+                                           .name = w->input };
     if (!status)
-        status = triptych_open(f->t, f->source,
-                               &(triptych_resources){ .memory_bytes = p->memory_bytes,
-                                                      .threads = p->threads,
-                                                      .renderer = p->renderer,
-                                                      .engine = p->engine,
-                                                      .keep_pages = !f->frugal,
-                                                      .choices_folder = p->choices_folder,
-                                                      .choose_later = 1,
-                                                      .name = w->input });
-    f->is_scene = !status && triptych_is_scene(f->t);
-    if (!status && w->heat && !f->is_scene)
+        status = p->open ? p->open(p->user, f->t, f->source, &resources)
+                         : triptych_open(f->t, f->source, &resources);
+    f->kind = status ? DRAW_A_VOLUME : kind_of(f->t);
+    if (!status && w->heat && !f->kind)
         status = open_heat(f);
     f->open = status == 0;
-    f->by_values = f->open && !f->is_scene && has_levels(f->t, TRIPTYCH_CLASSIFY_POST) &&
+    f->by_values = f->open && !f->kind && has_levels(f->t, TRIPTYCH_CLASSIFY_POST) &&
                    !has_levels(f->t, TRIPTYCH_CLASSIFY_PRE);
     return status;
 }
 
-/* A scene has colours of its own, and only the factor on its opacity applies. */
+/* A scene has colours of its own, and only the factor on its opacity applies. The volumes of a scene
+ * file take no edited function. */
 static void drop_function_of_scene(trip_frames *f)
 {
-    free((char *)(uintptr_t)f->now.function);
+    if (f->kind == DRAW_SCENES) {
+        free((char *)(uintptr_t)f->now.function);
+        f->now.function = NULL;
+    }
     free((char *)(uintptr_t)f->now.text);
-    f->now.function = f->now.text = NULL;
+    f->now.text = NULL;
 }
 
 static int use_function(trip_frames *f)
@@ -251,7 +264,7 @@ static int use_function(trip_frames *f)
     pthread_mutex_lock(&f->lock);
     f->status.left_out = !status && left_out;
     pthread_mutex_unlock(&f->lock);
-    f->other_function |= !status && !w->text && !f->is_scene;
+    f->other_function |= !status && !w->text && !f->kind;
     free(f->function);
     f->function = status ? NULL : key;
     if (status)
@@ -264,13 +277,13 @@ static int use_function(trip_frames *f)
 static draw_settings with_levels(const trip_frames *f, double lod_px, double max_ms)
 {
     draw_settings s = f->now.settings;
-    if (f->plain || !draw_settings_applies(&s, DRAW_LOD, f->is_scene))
+    if (f->plain || !draw_settings_applies(&s, DRAW_LOD, f->kind))
         return s;
     /* Use post, unless a setting requires splats. */
     if (f->by_values && s.all.classify == TRIPTYCH_CLASSIFY_PRE)
         s.all.classify = TRIPTYCH_CLASSIFY_AUTO;
     s.lod.voxel_px = fmax(s.lod.voxel_px, lod_px);
-    if (draw_settings_applies(&s, DRAW_MAX_MS, f->is_scene))
+    if (draw_settings_applies(&s, DRAW_MAX_MS, f->kind))
         s.lod.max_ms = s.lod.max_ms > 0 ? fmin(s.lod.max_ms, max_ms) : max_ms;
     return s;
 }
@@ -319,14 +332,14 @@ static int describe_scene(trip_frames *f, trip_opened *o)
     int status = triptych_get_scene(f->t, &o->scene);
     o->scene.notes = NULL;
     o->info = trip_scene_bounds(&o->scene);
-    o->is_scene = true;
+    o->kind = f->kind;
     o->source = strdup(f->source);
     return status;
 }
 
 static int describe(trip_frames *f, trip_opened *o)
 {
-    if (f->is_scene)
+    if (f->kind)
         return describe_scene(f, o);
     int status = triptych_get_info(f->t, &o->info);
     if (status)
@@ -591,9 +604,9 @@ static int draw_moving(trip_frames *f, double target_ms)
     const double detail = trip_pace_scale(&f->pace, wanted_pixels(f), MOVING_SHARE * target_ms);
     const double scale = sqrt(detail);
     draw_settings settings = with_levels(f, MOVING_LOD_PX * scale / detail, MOVING_MAX * target_ms);
-    if (!f->is_scene && settings.sheet.samples <= 0 && draw_settings_may_use_sheets(&settings))
+    if (f->kind != DRAW_SCENES && settings.sheet.samples <= 0 && draw_settings_may_use_sheets(&settings))
         settings.sheet.samples = MOVING_SAMPLES;
-    if (!f->is_scene && settings.all.samples <= 0) /* scenes have one by default */
+    if (f->kind != DRAW_SCENES && settings.all.samples <= 0) /* scenes have one by default */
         settings.all.samples = 1;
     return draw(f, scale, detail, &settings, true);
 }
@@ -626,7 +639,7 @@ static bool gains_little(const trip_frames *f, double target_ms, double whole_ms
 {
     const double detail = trip_pace_scale(&f->pace, wanted_pixels(f), MOVING_SHARE * target_ms);
     const double small_ms = trip_pace_expect_ms(&f->pace, detail * detail * wanted_pixels(f));
-    return f->is_scene && small_ms > SLOW_MS && small_ms > LITTLE_SHARE * whole_ms;
+    return f->kind && small_ms > SLOW_MS && small_ms > LITTLE_SHARE * whole_ms;
 }
 
 /* Draws a picture at once, then the full one. If the full one takes long, draws a coarse one of
@@ -644,7 +657,7 @@ static int draw_whole(trip_frames *f)
         return draw(f, 1, 1, whole, true);
     int status = draw_moving(f, target_ms);
     if (!status && !f->whole && whole_ms > LONG_MS && !has_newer(f) &&
-        draw_settings_applies(whole, DRAW_LOD, f->is_scene))
+        draw_settings_applies(whole, DRAW_LOD, f->kind))
         status = draw_coarse(f, whole_ms);
     if (!status && !f->whole && !has_newer(f))
         status = draw(f, 1, 1, whole, false);
@@ -666,8 +679,8 @@ static int prepare(trip_frames *f)
         status = open_data(f);
     }
     if (!status)
-        draw_settings_drop_kind(&f->now.settings, f->is_scene);
-    if (!status && f->is_scene)
+        draw_settings_drop_kind(&f->now.settings, f->kind);
+    if (!status && f->kind)
         drop_function_of_scene(f);
     if (f->cold)
         f->now.settings.effects.which &= ~TRIPTYCH_EFFECT_EMISSION;

@@ -64,11 +64,13 @@ static void add_document(cJSON *root, trip_viewer *v)
     cJSON_AddNumberToObject(root, "documents", v->count);
     if (d)
         cJSON_AddStringToObject(root, "input", d->input);
-    if (d && d->is_scene) {
+    if (d && d->kind) {
+        cJSON_AddNumberToObject(root, "objects", d->scene.objects);
+        cJSON_AddNumberToObject(root, "volumes", d->scene.volumes);
         cJSON_AddNumberToObject(root, "gaussians", (double)d->scene.gaussians);
         cJSON_AddStringToObject(root, "order", draw_settings_choice(&d->settings, DRAW_ORDER));
     }
-    cJSON *dims = d && d->opened && !d->is_scene ? cJSON_AddArrayToObject(root, "dims") : NULL;
+    cJSON *dims = d && d->opened && !d->kind ? cJSON_AddArrayToObject(root, "dims") : NULL;
     for (int a = 0; a < 3 && dims; a++)
         cJSON_AddItemToArray(dims, cJSON_CreateNumber((double)d->info.dims[a]));
     if (camera)

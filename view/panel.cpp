@@ -607,8 +607,8 @@ bool draw_level(trip_panel *p, draw_settings *s)
 bool draw_quality(trip_panel *p, trip_document *d)
 {
     draw_settings *s = &d->settings;
-    bool changed = !d->is_scene && draw_quality_of_volume(p, s);
-    if (draw_settings_applies(s, DRAW_LOD, d->is_scene))
+    bool changed = d->kind == DRAW_A_VOLUME && draw_quality_of_volume(p, s);
+    if (draw_settings_applies(s, DRAW_LOD, d->kind))
         changed |= draw_level(p, s);
     int rays = s->all.samples > 0 ? s->all.samples : 0;
     changed |=
@@ -637,13 +637,13 @@ bool draw_papers(trip_panel *p, trip_document *d)
     static const char *const sums[] = { "Per splat", "Per sheet" };
     static const int merge = TRIPTYCH_METHOD_MERGE, by_splat = TRIPTYCH_COMPOSITING_SPLAT;
     bool changed = false;
-    if (draw_settings_applies(s, DRAW_METHOD, d->is_scene))
+    if (draw_settings_applies(s, DRAW_METHOD, d->kind))
         changed |= choose_setting(p, "Method", &s->all.method, methods, 3, merge);
-    if (s->all.method <= TRIPTYCH_METHOD_MERGE && draw_settings_applies(s, DRAW_H, d->is_scene))
+    if (s->all.method <= TRIPTYCH_METHOD_MERGE && draw_settings_applies(s, DRAW_H, d->kind))
         changed |= slide_or_default(p, "Blend start (h)", &s->all.h, 0.01, 0.99, "%.2f");
     changed |=
         slide_or_default(p, "Early termination", &s->all.early_termination, 0.001, 0.1, "%.3f");
-    if (!d->is_scene && draw_settings_classify(s) != TRIPTYCH_CLASSIFY_POST) {
+    if (d->kind == DRAW_A_VOLUME && draw_settings_classify(s) != TRIPTYCH_CLASSIFY_POST) {
         double radius = s->splat.kernel_radius > 0 ? s->splat.kernel_radius : 2;
         changed |= choose_setting(p, "Compositing", &s->splat.compositing, sums, 2, by_splat);
         if (slide(p, "Kernel radius", &radius, 1.5, 6, "%.2f voxels")) {
@@ -676,19 +676,20 @@ bool draw_clip_box(trip_panel *p, trip_document *d)
         { { "i min", "i max" }, { "j min", "j max" }, { "k min", "k max" } },
         { { "x min", "x max" }, { "y min", "y max" }, { "z min", "z max" } },
     };
+    const bool is_scene = d->kind != DRAW_A_VOLUME;
     triptych_clip *c = &d->settings.clip;
     triptych_clip all = {};
     bool changed = check(p, "Clip box", &c->box);
-    trip_clipping_box_of_all(&all, &d->info, d->is_scene);
+    trip_clipping_box_of_all(&all, &d->info, is_scene);
     if (changed && c->box && !(c->box_lo[0] < c->box_hi[0]))
-        trip_clipping_box_of_all(c, &d->info, d->is_scene);
-    for (int i = 0; i < 6 && c->box && (c->box_of_voxels || d->is_scene); i++) {
+        trip_clipping_box_of_all(c, &d->info, is_scene);
+    for (int i = 0; i < 6 && c->box && (c->box_of_voxels || is_scene); i++) {
         const int axis = i / 2, face = i % 2;
         double position = face ? c->box_hi[axis] : c->box_lo[axis];
-        if (slide(p, labels[d->is_scene][axis][face], &position, all.box_lo[axis], all.box_hi[axis],
-                  d->is_scene ? "%.4g" : "%.1f")) {
+        if (slide(p, labels[is_scene ? 1 : 0][axis][face], &position, all.box_lo[axis], all.box_hi[axis],
+                  is_scene ? "%.4g" : "%.1f")) {
             trip_clipping_set_face(c, axis, face, position,
-                                   d->is_scene ? (all.box_hi[axis] - all.box_lo[axis]) / 1e4
+                                   is_scene ? (all.box_hi[axis] - all.box_lo[axis]) / 1e4
                                                : 0.01);
             changed = true;
         }
@@ -781,7 +782,7 @@ void draw_gauges(trip_panel *p, trip_viewer *v, const trip_document *d)
     char text[160], level[64] = "";
     float times[TIMES];
     const int count = trip_frames_get_times(v->frames, TIMES, times);
-    if (d->is_scene) {
+    if (d->kind != DRAW_A_VOLUME) {
         trip_scene_say(&d->scene, &shown, nullptr, text, sizeof text);
         ImGui::TextWrapped("%s", text);
     }
@@ -790,13 +791,13 @@ void draw_gauges(trip_panel *p, trip_viewer *v, const trip_document *d)
         return;
     }
     draw_memory(p, f);
-    if (!d->is_scene) // the system caches the files of a scene
+    if (d->kind == DRAW_A_VOLUME) // the system caches the files of a scene
         draw_cached(p, f);
     ImGui::Text("%s read, %s/s; %.3g million %s",
                 bytes_text(static_cast<double>(f.bytes_read)).c_str(),
                 bytes_text(f.ms > 0 ? static_cast<double>(f.bytes_read) / f.ms * 1e3 : 0).c_str(),
-                static_cast<double>(f.splats) * 1e-6, d->is_scene ? "drawn" : "splats");
-    if (draw_settings_applies(&shown, DRAW_LOD, d->is_scene))
+                static_cast<double>(f.splats) * 1e-6, d->kind != DRAW_A_VOLUME ? "drawn" : "splats");
+    if (draw_settings_applies(&shown, DRAW_LOD, d->kind))
         std::snprintf(level, sizeof level, ", level of detail %.1f px", s.lod_px);
     ImGui::TextWrapped("moving: %.0f ms, resolution 1/%.1f%s; full: %.0f ms", s.moving_ms,
                        s.scale > 0 ? 1 / s.scale : 1.0, level, s.whole_ms);
@@ -996,7 +997,7 @@ void draw_over(trip_panel *p, trip_viewer *v)
             draw_axes(list, v, d);
         if (v->scale_bar)
             draw_scale_bar(list, v, d, p->scale);
-        if (v->probe && !d->is_scene)
+        if (v->probe && d->kind == DRAW_A_VOLUME)
             draw_probe(list, v, d);
     }
     draw_progress(list, v, p->scale);
@@ -1016,13 +1017,13 @@ void draw_document(trip_panel *p, trip_viewer *v, trip_document *d)
         draw_view(p, v, d);
     if (!d->opened)
         return;
-    if (d->is_scene && section(p, "Scene"))
+    if (d->kind != DRAW_A_VOLUME && section(p, "Scene"))
         v->changed |= draw_scene(p, d);
-    if (!d->is_scene && section(p, "Transfer function"))
+    if (d->kind == DRAW_A_VOLUME && section(p, "Transfer function"))
         draw_function(p, v, d);
-    if (!d->is_scene && section(p, "Light"))
+    if (d->kind == DRAW_A_VOLUME && section(p, "Light"))
         v->changed |= draw_light(p, d);
-    if (!d->is_scene && section(p, "Effects", d->settings.effects.which != 0))
+    if (d->kind == DRAW_A_VOLUME && section(p, "Effects", d->settings.effects.which != 0))
         v->changed |= draw_effects(p, d);
     if (section(p, "Quality"))
         v->changed |= draw_quality(p, d);
@@ -1031,8 +1032,8 @@ void draw_document(trip_panel *p, trip_viewer *v, trip_document *d)
     if (section(p, "Clipping", false))
         v->changed |= draw_clipping(p, d);
     if (section(p, "Show")) {
-        v->changed |= !d->is_scene && draw_shown(p, d);
-        draw_marks(p, v, d->is_scene);
+        v->changed |= d->kind == DRAW_A_VOLUME && draw_shown(p, d);
+        draw_marks(p, v, d->kind != DRAW_A_VOLUME);
     }
     if (section(p, "Statistics"))
         draw_gauges(p, v, d);

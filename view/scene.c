@@ -19,10 +19,19 @@ static void add(trip_scene_entry *e, const char *label, const char *value)
     e->value = value;
 }
 
+static bool has_gaussians(const triptych_scene *scene)
+{
+    return !scene->volumes || scene->objects > scene->volumes;
+}
+
 /* Returns whether the scene has a choice. Degrees above the scene's own add nothing. */
 static bool has_choice(int row, int choice, const triptych_scene *scene)
 {
-    return draw_settings_choice_applies(row, choice, true) &&
+    if (scene->volumes && !draw_settings_choice_applies(row, choice, DRAW_OBJECTS))
+        return false;
+    if (row == DRAW_ORDER && choice == TRIPTYCH_ORDER_SHEETS - 1 && scene->moved)
+        return false;
+    return has_gaussians(scene) && draw_settings_choice_applies(row, choice, DRAW_SCENES) &&
            (row != DRAW_HARMONICS || choice < scene->degree);
 }
 
@@ -58,13 +67,28 @@ void trip_scene_choose(const trip_scene_choice *choice, const trip_scene_entry *
             *value = row->first + i;
 }
 
+/* One scene alone is no list of objects. */
+static const char *say_objects(const triptych_scene *scene, char *text, size_t bytes)
+{
+    const unsigned n = scene->objects, volumes = scene->volumes;
+    text[0] = 0;
+    if (volumes)
+        snprintf(text, bytes, "%u object%s, %u of them volume%s: ", n, n == 1 ? "" : "s", volumes,
+                 volumes == 1 ? "" : "s");
+    else if (n > 1)
+        snprintf(text, bytes, "%u objects: ", n);
+    return text;
+}
+
 void trip_scene_say(const triptych_scene *scene, const draw_settings *s,
                     const trip_frames_status *status, char *text, size_t bytes)
 {
     char peak[32], all[32];
-    const size_t at =
-        (size_t)snprintf(text, bytes, "%llu Gaussians by %s", (unsigned long long)scene->gaussians,
-                         draw_settings_choice(s, DRAW_ORDER));
+    char objects[64];
+    const size_t at = (size_t)snprintf(text, bytes, "%s%llu Gaussians by %s",
+                                       say_objects(scene, objects, sizeof objects),
+                                       (unsigned long long)scene->gaussians,
+                                       draw_settings_choice(s, DRAW_ORDER));
     if (!status || !(status->whole_ms > 0) || at >= bytes)
         return;
     trip_format_bytes(status->stats.peak_memory_bytes, peak);

@@ -34,6 +34,7 @@ typedef struct trip_view_params {
     /* As in frames.h and maker.h. */
     int (*find)(void *user, triptych *t, const char *input, bool keep_all, bool *small,
                 const char **path);
+    int (*open)(void *user, triptych *t, const char *path, const triptych_resources *resources);
     int (*make)(void *user, triptych *t, const char *input,
                 bool keep_all); /* NULL disables background bricking */
     void (*release)(void *user);

@@ -198,12 +198,12 @@ void trip_viewer_close(trip_viewer *v)
 
 const char *trip_viewer_heat(const trip_document *d)
 {
-    return d->cold || d->is_scene ? NULL : d->heat;
+    return d->cold || d->kind ? NULL : d->heat;
 }
 
 const char *trip_viewer_function(const trip_document *d)
 {
-    return d->is_scene ? NULL : d->function;
+    return d->kind == DRAW_SCENES ? NULL : d->function;
 }
 
 draw_settings trip_viewer_settings(const trip_document *d)
@@ -219,7 +219,7 @@ draw_settings trip_viewer_settings(const trip_document *d)
     }
     draw_settings_drop_excluded(&s, TRIPTYCH_RENDERER_AUTO);
     if (d->opened)
-        draw_settings_drop_kind(&s, d->is_scene);
+        draw_settings_drop_kind(&s, d->kind);
     return s;
 }
 
@@ -255,8 +255,8 @@ static void describe(trip_document *d, trip_opened *o)
     d->opened = true;
     d->small = o->small;
     d->cold = o->cold;
-    d->is_scene = o->is_scene;
-    d->edited &= !d->is_scene;
+    d->kind = o->kind;
+    d->edited &= !d->kind;
     d->info = o->info;
     d->scene = o->scene;
     d->histogram = o->histogram;
@@ -716,8 +716,10 @@ static void drop(trip_viewer *v, const char *path)
     const char *dot = strrchr(path, '.');
     const trip_document *d = trip_viewer_document(v);
     const bool is_function = dot && !strcmp(dot, ".tf") && d;
-    if (is_function && d->is_scene)
+    if (is_function && d->kind == DRAW_SCENES)
         trip_viewer_say(v, "a Gaussian scene has colours of its own: no transfer function applies");
+    else if (is_function && d->kind)
+        trip_viewer_say(v, "--tf and the scene file choose the transfer functions of its volumes");
     else if (is_function)
         trip_viewer_set_function(v, path);
     else
@@ -734,7 +736,7 @@ static int check_set(const trip_document *d, const char *options)
         given.scene.order = d->settings.scene.order;
     return status || !d->opened
                ? status
-               : draw_settings_check_kind(&given, &(triptych_resources){ 0 }, d->is_scene);
+               : draw_settings_check_kind(&given, &(triptych_resources){ 0 }, d->kind);
 }
 
 /* Clipping that is set becomes active. */
@@ -814,7 +816,7 @@ static void probe(trip_viewer *v)
     const trip_document *d = navigable(v);
     const bool inside =
         v->at[0] >= 0 && v->at[1] >= 0 && v->at[0] < v->picture_width && v->at[1] < v->height;
-    if (!d || d->is_scene || !v->probe || !inside || !v->status.exact ||
+    if (!d || d->kind || !v->probe || !inside || !v->status.exact ||
         (!memcmp(v->at, v->probed, sizeof v->at) &&
          !memcmp(&v->probed_from, &d->navigation, sizeof d->navigation)))
         return;

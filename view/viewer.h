@@ -22,8 +22,8 @@ typedef struct trip_document {
     bool cold;            /* heat failed to open; drawn without emission */
     bool small;           /* a preview of samples; the full volume is still to be bricked */
     bool opened;          /* the members below are known */
-    bool is_scene;        /* a Gaussian scene */
-    triptych_info info;   /* of a scene: only the bounds that views fit */
+    draw_kind kind;       /* DRAW_A_VOLUME is 0 */
+    triptych_info info;   /* unless it is a volume: only the bounds that views fit */
     triptych_scene scene; /* zero for a volume */
     char *source;         /* path of the data set */
     triptych_histogram histogram;
@@ -88,7 +88,7 @@ trip_document *trip_viewer_document(trip_viewer *v);
 /* Returns the settings for the library, without the parts that the data set cannot draw. */
 draw_settings trip_viewer_settings(const trip_document *d);
 /* Returns the transfer function, a preset or a file; NULL for the data set's default and for
- * scenes.
+ * Gaussian scenes.
  */
 const char *trip_viewer_function(const trip_document *d);
 /* Returns the heat data set if it can be opened, else NULL. */

@@ -482,6 +482,7 @@ static int start_frames(window *w)
         .wake = wake,
         .wake_user = w,
         .find = p->find,
+        .open = p->open,
         .release = p->release,
         .user = p->user,
     };
