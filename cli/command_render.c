@@ -139,8 +139,7 @@ static bool places_objects(const drawing *d)
 static int check_objects(const drawing *d)
 {
     const render_options *o = &d->o;
-    int status =
-        placed_input_check(&d->placed, d->t, &o->settings, &o->resources, &o->function);
+    int status = placed_input_check(&d->placed, d->t, &o->settings, &o->resources, &o->function);
     if (!status && o->quality.error > 0)
         status = trip_option_fail("--error", TRIP_NOT_OF_OBJECTS);
     if (!status && o->field == RENDER_FIELD_SOURCE)

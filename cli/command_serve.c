@@ -89,7 +89,8 @@ static int parse_options(serve_options *o, int argc, char **argv)
                 } };
     const command_line c = {
         .args_doc = "VOLUME|NAME.trip",
-        .doc = "Shows a volume, a Gaussian scene, a data set or a scene file in a browser, at the address that "
+        .doc = "Shows a volume, a Gaussian scene, a data set or a scene file in a browser, at the "
+               "address that "
                "this command "
                "prints, until it is interrupted. A moving view is sent as JPEG. At rest the page "
                "gets the picture of `triptych render` as PNG. The server listens to 127.0.0.1 "

@@ -140,7 +140,8 @@ static int parse_options(view_command *o, int argc, char **argv)
                 } };
     const command_line c = {
         .args_doc = "[VOLUME|NAME.trip...]",
-        .doc = "Shows volumes, Gaussian scenes, data sets or scene files in a window, where you turn, cut, "
+        .doc = "Shows volumes, Gaussian scenes, data sets or scene files in a window, where you "
+               "turn, cut, "
                "classify and fly "
                "through them. A moving view is drawn with as little detail as keeps to --fps. At "
                "rest the picture equals the picture of `triptych render`, bit for bit. A volume is "

@@ -11,6 +11,12 @@
 #include "report.h"
 #include "text.h"
 
+static int fail_function(const char *scene)
+{
+    return trip_fail(TRIP_USAGE, "read", scene,
+                     "is a Gaussian scene with colours of its own; leave out tf");
+}
+
 /* Finds or makes the data set of object `i`. Objects with the same path and function share it. */
 static int find_data(placed_input *p, triptych *t, unsigned i,
                      const triptych_brick_options *options)
@@ -21,8 +27,7 @@ static int find_data(placed_input *p, triptych *t, unsigned i,
     cached_wish wish = { .options = *options };
     p->objects[i].name = path;
     if (given->function && is_scene)
-        return trip_fail(TRIP_USAGE, "read", path,
-                         "is a Gaussian scene with colours of its own; leave out tf");
+        return fail_function(path);
     if (!cached_volume_wanted(path))
         return 0;
     for (unsigned k = 0; k < i; k++)
@@ -108,26 +113,28 @@ int placed_input_list(placed_input *p, triptych *t, const char *const *paths, un
     return status ? status : find_all(p, t, paths[0], options);
 }
 
-/* Returns what the picture shows. */
-static draw_kind picture_of(const placed_input *p, unsigned scenes)
+/* Whether the picture is more than one data set that stays where it is. */
+static bool is_moved(const placed_input *p)
 {
     static const triptych_object unplaced = { .matrix = TRIPTYCH_UNPLACED };
-    const bool placed = p->count > 1 || p->given->function ||
-                        memcmp(p->given->matrix, unplaced.matrix, sizeof unplaced.matrix) != 0;
-    return scenes == p->count ? DRAW_SCENES : placed ? DRAW_OBJECTS : DRAW_A_VOLUME;
+    return p->count > 1 || memcmp(p->given->matrix, unplaced.matrix, sizeof unplaced.matrix) != 0;
 }
 
 int placed_input_check(const placed_input *p, triptych *t, const draw_settings *settings,
                        const triptych_resources *resources,
                        const triptych_transfer_function *function)
 {
-    static const triptych_object unplaced = { .matrix = TRIPTYCH_UNPLACED };
     unsigned scenes = 0;
-    for (unsigned i = 0; i < p->count; i++)
-        scenes += triptych_is_gaussians(t, p->given[i].path) != 0;
-    const draw_kind kind = picture_of(p, scenes);
-    const bool moved = p->count > 1 ||
-                       memcmp(p->given->matrix, unplaced.matrix, sizeof unplaced.matrix) != 0;
+    for (unsigned i = 0; i < p->count; i++) {
+        const bool is_scene = triptych_is_gaussians(t, p->given[i].path) != 0;
+        if (is_scene && p->given[i].function)
+            return fail_function(p->given[i].path);
+        scenes += is_scene;
+    }
+    const bool moved = is_moved(p);
+    const draw_kind kind = scenes == p->count            ? DRAW_SCENES
+                           : moved || p->given->function ? DRAW_OBJECTS
+                                                         : DRAW_A_VOLUME;
     int status = draw_settings_check_kind(settings, resources, kind);
     if (!status && settings->scene.order == TRIPTYCH_ORDER_SHEETS && moved)
         status = trip_option_fail("--order", "sheets draws one scene alone, where it lies");

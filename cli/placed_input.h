@@ -26,8 +26,8 @@ int placed_input_read(placed_input *p, triptych *t, const char *path,
  * ';' between them; NULL places nothing. */
 int placed_input_list(placed_input *p, triptych *t, const char *const *paths, unsigned count,
                       const char *places, const triptych_brick_options *options);
-/* Checks that the settings and the function apply to the objects in `given`. Settings for volumes do
- * not concern scenes beside them, and the reverse. */
+/* Checks that the settings and the function apply to the objects in `given`. Settings for volumes
+ * do not concern scenes beside them, and the reverse. */
 int placed_input_check(const placed_input *p, triptych *t, const draw_settings *settings,
                        const triptych_resources *resources,
                        const triptych_transfer_function *function);

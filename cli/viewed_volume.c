@@ -68,7 +68,8 @@ static int check_volume(const viewed_volume *s, triptych *t, const char *volume)
 static int check_object(const viewed_volume *s, triptych *t, const triptych_object *o,
                         const triptych_resources *resources)
 {
-    viewed_volume one = { .options = s->options, .function = o->function ? o->function : s->function };
+    viewed_volume one = { .options = s->options,
+                          .function = o->function ? o->function : s->function };
     if (triptych_is_gaussians(t, o->path))
         one.function = NULL;
     if (cached_volume_wanted(o->path))
@@ -238,8 +239,9 @@ int viewed_volume_make(void *user, triptych *t, const char *input, bool keep_all
 {
     cached_volume made = { .hold = -1 };
     if (triptych_is_scene_file(input))
-        return trip_fail(TRIP_USAGE, "brick", input,
-                         "is a scene file; brick its volumes with --keep-all and name the data sets");
+        return trip_fail(
+            TRIP_USAGE, "brick", input,
+            "is a scene file; brick its volumes with --keep-all and name the data sets");
     const int status = open_volume(user, &made, t, input, keep_all);
     cached_volume_close(&made);
     return status;

@@ -30,8 +30,8 @@ int viewed_volume_choose(viewed_volume *s, quality_options *q, const char *input
 
 /* Checks the inputs before anything is shown. All settings must apply to a volume or to a Gaussian
  * scene. A data set must open and accept the transfer function. A volume must exist in a known
- * format, and its transfer function must load. This holds for each object of a scene file. The context has no data set open before the call or
- * after it. */
+ * format, and its transfer function must load. This holds for each object of a scene file. The
+ * context has no data set open before the call or after it. */
 int viewed_volume_check(const viewed_volume *s, triptych *t, const char *input,
                         const triptych_resources *resources);
 

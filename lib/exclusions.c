@@ -328,7 +328,7 @@ static const uint64_t of_both =
     ROW(SAMPLES) | ROW(DEPTH) | ROW(NORMALISE) | ROW(METHOD) | ROW(H) | ROW(LOD) | ROW(TOLERANCE);
 
 static const uint64_t not_of_objects = ROW(SHEET) | ROW(DEPTH) | ROW(LOD) | ROW(MAX_BYTES) |
-                                      ROW(MAX_MS) | ROW(SHOW) | ROW(COUNT) | ROW(TEMPERATURE);
+                                       ROW(MAX_MS) | ROW(SHOW) | ROW(COUNT) | ROW(TEMPERATURE);
 
 #define NOT_OF_OBJECTS "does not apply to a picture with volumes beside other objects"
 
@@ -357,8 +357,8 @@ static uint64_t rows_of_kind(const draw_settings *s, draw_kind kind)
     const uint64_t merging = ROW(METHOD) | ROW(H);
     if (kind == DRAW_A_VOLUME)
         return ~of_scenes;
-    if (kind == DRAW_OBJECTS)
-        return ~not_of_objects;
+    if (kind == DRAW_OBJECTS) /* the finest level can be asked for */
+        return ~not_of_objects | (s->lod.voxel_px == TRIPTYCH_ZERO ? ROW(LOD) : 0);
     return (of_scenes | of_both) & (has_one_layer(s) ? ~merging : ~0ULL);
 }
 
@@ -399,15 +399,13 @@ static int check_resources_of_scenes(const triptych_resources *r)
 
 int draw_settings_check_kind(const draw_settings *s, const triptych_resources *r, draw_kind kind)
 {
-    static const struct rule of_kinds[] = {
+    const struct rule of_kinds[] = {
         [DRAW_A_VOLUME] = { .given = of_scenes, .why = "applies to Gaussian scenes only" },
         [DRAW_SCENES] = { .given = ~(of_scenes | of_both),
                           .why = "does not apply to Gaussian scenes" },
-        [DRAW_OBJECTS] = { .given = not_of_objects, .why = NOT_OF_OBJECTS },
+        [DRAW_OBJECTS] = { .given = ~rows_of_kind(s, DRAW_OBJECTS), .why = NOT_OF_OBJECTS },
     };
-    /* objects are drawn at the finest level */
-    const bool finest = kind == DRAW_OBJECTS && s->lod.voxel_px == TRIPTYCH_ZERO;
-    const uint64_t given = given_rows(s) & ~(finest ? ROW(LOD) : 0);
+    const uint64_t given = given_rows(s);
     const struct choice *choice = find_missing(s, kind);
     const struct rule of_layers = {
         .given = ~rows_of_kind(s, kind),
@@ -423,10 +421,9 @@ int draw_settings_check_kind(const draw_settings *s, const triptych_resources *r
     if (of_layers.given & given)
         return fail_rule(&of_layers, given);
     if (kind != DRAW_A_VOLUME && s->clip.box && s->clip.box_of_voxels)
-        return trip_option_fail("--clip-box",
-                                kind == DRAW_SCENES
-                                    ? "voxels: does not apply to Gaussian scenes"
-                                    : "voxels: " NOT_OF_OBJECTS);
+        return trip_option_fail("--clip-box", kind == DRAW_SCENES
+                                                  ? "voxels: does not apply to Gaussian scenes"
+                                                  : "voxels: " NOT_OF_OBJECTS);
     return kind == DRAW_SCENES ? check_resources_of_scenes(r) : 0;
 }
 

@@ -289,9 +289,8 @@ static int check_resources(const triptych_resources *r)
 static bool places_volumes(const triptych_object *objects, unsigned count)
 {
     static const triptych_object unplaced = { .matrix = TRIPTYCH_UNPLACED };
-    const bool placed =
-        count > 1 || objects->function ||
-        memcmp(objects->matrix, unplaced.matrix, sizeof unplaced.matrix) != 0;
+    const bool placed = count > 1 || objects->function ||
+                        memcmp(objects->matrix, unplaced.matrix, sizeof unplaced.matrix) != 0;
     bool volumes = false;
     for (unsigned i = 0; i < count; i++)
         volumes |= !trip_gaussian_set_is(objects[i].path);

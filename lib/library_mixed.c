@@ -450,8 +450,8 @@ int trip_context_step_mixed(triptych *t, uint64_t deadline_ns)
     int status = 0;
     while (!status && m->slab <= m->cut_count) {
         const trip_depth_range slab = slab_of(m);
-        status = m->next < m->count ? draw_next(t, slab, deadline_ns)
-                                     : end_slab(t, slab, deadline_ns);
+        status =
+            m->next < m->count ? draw_next(t, slab, deadline_ns) : end_slab(t, slab, deadline_ns);
         if (!status && trip_interrupted())
             status = trip_fail(TRIP_INTERRUPTED, "render", t->name, "interrupted");
         if (!status && t->show)

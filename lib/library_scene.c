@@ -272,8 +272,8 @@ static int check(const triptych *t)
     triptych_renderer r = t->resources.renderer;
     if (!t->mixed && r == TRIPTYCH_RENDERER_INTEGRAL && draw_settings_check(&t->given, &r, false))
         return TRIP_USAGE;
-    const int status = draw_settings_check_kind(&t->given, &t->resources,
-                                                t->mixed ? DRAW_OBJECTS : DRAW_SCENES);
+    const int status =
+        draw_settings_check_kind(&t->given, &t->resources, t->mixed ? DRAW_OBJECTS : DRAW_SCENES);
     return status ? status : check_sheets(t);
 }
 

@@ -221,14 +221,14 @@ typedef struct triptych_scene {
     /* Bounds of the centres without the outer 1 % on each side; if these are a point, bounds of the
      * Gaussians. Views fit these. */
     double typical_lo[3], typical_hi[3];
-    const char *notes; /* JSON; belongs to the data set; NULL if only volumes are placed */
+    const char *notes;         /* JSON; belongs to the data set; NULL if only volumes are placed */
     unsigned objects, volumes; /* in the picture; volumes are counted in `objects` too */
     int moved;                 /* several objects, or one with a place of its own */
 } triptych_scene;
 
-/* Returns 1 if the open data set is a Gaussian scene, or if objects with places are open. These functions do not apply to scenes, and
- * fail with TRIPTYCH_USAGE: triptych_get_info(), triptych_get_list(), triptych_add(), and those
- * about values, heat and probes. */
+/* Returns 1 if the open data set is a Gaussian scene, or if objects with places are open. These
+ * functions do not apply to scenes, and fail with TRIPTYCH_USAGE: triptych_get_info(),
+ * triptych_get_list(), triptych_add(), and those about values, heat and probes. */
 TRIPTYCH_API int triptych_is_scene(const triptych *t);
 /* Describes the open scene. Fails with TRIPTYCH_USAGE if a volume or nothing is open. For several
  * objects in one picture, it sums the counts of the scenes, joins the bounds of all objects, and
@@ -537,8 +537,8 @@ typedef enum triptych_field {
 typedef struct triptych_integral_settings {
     triptych_field field;
     /* Bound of the error of each component of a pixel, 1e-12 to 0.1. The default is 1e-3 for the
-     * mean over the area of each pixel, 1e-4 for a number of rays per pixel, and 5e-5 for a Gaussian
-     * scene. */
+     * mean over the area of each pixel, 1e-4 for a number of rays per pixel, and 5e-5 for a
+     * Gaussian scene. */
     double tolerance;
 } triptych_integral_settings;
 

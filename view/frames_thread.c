@@ -227,8 +227,8 @@ static int open_data(trip_frames *f)
     return status;
 }
 
-/* A scene has colours of its own, and only the factor on its opacity applies. The volumes of a scene
- * file take no edited function. */
+/* A scene has colours of its own, and only the factor on its opacity applies. The volumes of a
+ * scene file take no edited function. */
 static void drop_function_of_scene(trip_frames *f)
 {
     if (f->kind == DRAW_SCENES) {
@@ -272,12 +272,18 @@ static int use_function(trip_frames *f)
     return status;
 }
 
+/* Pictures with volumes beside other objects have no coarse levels by choice. */
+static bool draws_levels(const trip_frames *f, const draw_settings *s)
+{
+    return f->kind != DRAW_OBJECTS && draw_settings_applies(s, DRAW_LOD, f->kind);
+}
+
 /* Returns the wanted settings with levels at least as coarse as lod_px. Short memory keeps the
  * finest level: pictures of several levels take more. */
 static draw_settings with_levels(const trip_frames *f, double lod_px, double max_ms)
 {
     draw_settings s = f->now.settings;
-    if (f->plain || !draw_settings_applies(&s, DRAW_LOD, f->kind))
+    if (f->plain || !draws_levels(f, &s))
         return s;
     /* Use post, unless a setting requires splats. */
     if (f->by_values && s.all.classify == TRIPTYCH_CLASSIFY_PRE)
@@ -604,7 +610,8 @@ static int draw_moving(trip_frames *f, double target_ms)
     const double detail = trip_pace_scale(&f->pace, wanted_pixels(f), MOVING_SHARE * target_ms);
     const double scale = sqrt(detail);
     draw_settings settings = with_levels(f, MOVING_LOD_PX * scale / detail, MOVING_MAX * target_ms);
-    if (f->kind != DRAW_SCENES && settings.sheet.samples <= 0 && draw_settings_may_use_sheets(&settings))
+    if (f->kind != DRAW_SCENES && settings.sheet.samples <= 0 &&
+        draw_settings_may_use_sheets(&settings))
         settings.sheet.samples = MOVING_SAMPLES;
     if (f->kind != DRAW_SCENES && settings.all.samples <= 0) /* scenes have one by default */
         settings.all.samples = 1;
@@ -656,8 +663,7 @@ static int draw_whole(trip_frames *f)
         (whole_ms > 0 && (whole_ms < target_ms || gains_little(f, target_ms, whole_ms))))
         return draw(f, 1, 1, whole, true);
     int status = draw_moving(f, target_ms);
-    if (!status && !f->whole && whole_ms > LONG_MS && !has_newer(f) &&
-        draw_settings_applies(whole, DRAW_LOD, f->kind))
+    if (!status && !f->whole && whole_ms > LONG_MS && !has_newer(f) && draws_levels(f, whole))
         status = draw_coarse(f, whole_ms);
     if (!status && !f->whole && !has_newer(f))
         status = draw(f, 1, 1, whole, false);

@@ -608,7 +608,7 @@ bool draw_quality(trip_panel *p, trip_document *d)
 {
     draw_settings *s = &d->settings;
     bool changed = d->kind == DRAW_A_VOLUME && draw_quality_of_volume(p, s);
-    if (draw_settings_applies(s, DRAW_LOD, d->kind))
+    if (d->kind != DRAW_OBJECTS && draw_settings_applies(s, DRAW_LOD, d->kind))
         changed |= draw_level(p, s);
     int rays = s->all.samples > 0 ? s->all.samples : 0;
     changed |=
@@ -686,11 +686,10 @@ bool draw_clip_box(trip_panel *p, trip_document *d)
     for (int i = 0; i < 6 && c->box && (c->box_of_voxels || is_scene); i++) {
         const int axis = i / 2, face = i % 2;
         double position = face ? c->box_hi[axis] : c->box_lo[axis];
-        if (slide(p, labels[is_scene ? 1 : 0][axis][face], &position, all.box_lo[axis], all.box_hi[axis],
-                  is_scene ? "%.4g" : "%.1f")) {
+        if (slide(p, labels[is_scene ? 1 : 0][axis][face], &position, all.box_lo[axis],
+                  all.box_hi[axis], is_scene ? "%.4g" : "%.1f")) {
             trip_clipping_set_face(c, axis, face, position,
-                                   is_scene ? (all.box_hi[axis] - all.box_lo[axis]) / 1e4
-                                               : 0.01);
+                                   is_scene ? (all.box_hi[axis] - all.box_lo[axis]) / 1e4 : 0.01);
             changed = true;
         }
     }
@@ -793,11 +792,11 @@ void draw_gauges(trip_panel *p, trip_viewer *v, const trip_document *d)
     draw_memory(p, f);
     if (d->kind == DRAW_A_VOLUME) // the system caches the files of a scene
         draw_cached(p, f);
-    ImGui::Text("%s read, %s/s; %.3g million %s",
-                bytes_text(static_cast<double>(f.bytes_read)).c_str(),
-                bytes_text(f.ms > 0 ? static_cast<double>(f.bytes_read) / f.ms * 1e3 : 0).c_str(),
-                static_cast<double>(f.splats) * 1e-6, d->kind != DRAW_A_VOLUME ? "drawn" : "splats");
-    if (draw_settings_applies(&shown, DRAW_LOD, d->kind))
+    ImGui::Text(
+        "%s read, %s/s; %.3g million %s", bytes_text(static_cast<double>(f.bytes_read)).c_str(),
+        bytes_text(f.ms > 0 ? static_cast<double>(f.bytes_read) / f.ms * 1e3 : 0).c_str(),
+        static_cast<double>(f.splats) * 1e-6, d->kind != DRAW_A_VOLUME ? "drawn" : "splats");
+    if (d->kind != DRAW_OBJECTS && draw_settings_applies(&shown, DRAW_LOD, d->kind))
         std::snprintf(level, sizeof level, ", level of detail %.1f px", s.lod_px);
     ImGui::TextWrapped("moving: %.0f ms, resolution 1/%.1f%s; full: %.0f ms", s.moving_ms,
                        s.scale > 0 ? 1 / s.scale : 1.0, level, s.whole_ms);

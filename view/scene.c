@@ -67,28 +67,28 @@ void trip_scene_choose(const trip_scene_choice *choice, const trip_scene_entry *
             *value = row->first + i;
 }
 
-/* One scene alone is no list of objects. */
-static const char *say_objects(const triptych_scene *scene, char *text, size_t bytes)
+/* Names the objects, unless one scene lies alone. */
+static int say_objects(const triptych_scene *scene, char *text, size_t bytes)
 {
-    const unsigned n = scene->objects, volumes = scene->volumes;
-    text[0] = 0;
+    const unsigned volumes = scene->volumes;
+    const unsigned scenes = scene->objects > volumes ? scene->objects - volumes : 0;
+    const char *more = volumes == 1 ? "" : "s", *many = scenes == 1 ? "" : "s";
+    if (volumes && scenes)
+        return snprintf(text, bytes, "%u volume%s and %u scene%s, ", volumes, more, scenes, many);
     if (volumes)
-        snprintf(text, bytes, "%u object%s, %u of them volume%s: ", n, n == 1 ? "" : "s", volumes,
-                 volumes == 1 ? "" : "s");
-    else if (n > 1)
-        snprintf(text, bytes, "%u objects: ", n);
-    return text;
+        return snprintf(text, bytes, "%u volume%s", volumes, more);
+    return scenes > 1 ? snprintf(text, bytes, "%u scenes, ", scenes) : 0;
 }
 
 void trip_scene_say(const triptych_scene *scene, const draw_settings *s,
                     const trip_frames_status *status, char *text, size_t bytes)
 {
     char peak[32], all[32];
-    char objects[64];
-    const size_t at = (size_t)snprintf(text, bytes, "%s%llu Gaussians by %s",
-                                       say_objects(scene, objects, sizeof objects),
-                                       (unsigned long long)scene->gaussians,
-                                       draw_settings_choice(s, DRAW_ORDER));
+    size_t at = (size_t)say_objects(scene, text, bytes);
+    if (has_gaussians(scene) && at < bytes)
+        at += (size_t)snprintf(text + at, bytes - at, "%llu Gaussians by %s",
+                               (unsigned long long)scene->gaussians,
+                               draw_settings_choice(s, DRAW_ORDER));
     if (!status || !(status->whole_ms > 0) || at >= bytes)
         return;
     trip_format_bytes(status->stats.peak_memory_bytes, peak);

@@ -37,8 +37,8 @@ int trip_scene_entries(const trip_scene_choice *choice, const triptych_scene *sc
 void trip_scene_choose(const trip_scene_choice *choice, const trip_scene_entry *entry,
                        draw_settings *s);
 
-/* Writes a line about the scene: count and order. With `status`, adds time and memory of the last
- * full picture. */
+/* Writes a line about the scene: objects, count and order. With `status`, adds time and memory of
+ * the last full picture. */
 void trip_scene_say(const triptych_scene *scene, const draw_settings *s,
                     const trip_frames_status *status, char *text, size_t bytes);
 /* Returns a description of a scene as of a volume. It has only the bounds that views fit. */

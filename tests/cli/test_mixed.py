@@ -170,6 +170,13 @@ class Mixed(program.ProgramTest):
         write_objects("b.json", {"data": "fog.nrrd", "matrix": mirror})
         self.leaves_nothing(2, "render", "b.json", "-o", "a.png", says="without mirroring")
 
+    def test_one_volume_has_the_function_of_the_file(self):
+        """Even fog that lies where its file says has the transmittance 0.9 for each voxel."""
+        write_fog("fog", WHITE)
+        write_objects("a.json", {"data": "fog.nrrd", "tf": "fog.tf"})
+        picture = self.picture("a.json", "--eye", "8,8,100", "--look", "8,8,0", "--ortho", "8", "--size=8x8", *CLEAR)
+        self.assertLess(abs(picture[..., 3] - (1 - 0.9 ** (VOXELS - 1))).max(), 1e-3)
+
     def test_a_small_memory_is_kept_or_refused(self):
         write_scene("splats.ply", SPLATS)
         program.write_nrrd("noise.nrrd", program.noise((32, 32, 32)))

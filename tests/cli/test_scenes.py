@@ -495,11 +495,11 @@ class Scenes(program.ProgramTest):
         write_objects("bad.json", {"data": "b.ply", "matrix": shear.ravel().tolist()})
         self.leaves_nothing(2, "render", "bad.json", "-o", "bad.png", says="scale it evenly")
 
-    def test_other_commands_and_options_refuse_scene_files(self):
+    def test_commands_and_options_for_data_sets_refuse_scene_files(self):
         for command in ("accuracy", "scene.json", "-o", "r"), ("bench", "stream", "scene.json"):
             self.leaves_nothing(1, *command, says="scene.json: is not a data set")
-        for command in ("view", "scene.json"), ("serve", "scene.json"), ("brick", "scene.json", "-o", "x.trip"):
-            self.leaves_nothing(2, *command, says="scene.json: is a scene file; `triptych render` draws it")
+        self.leaves_nothing(2, "brick", "scene.json", "-o", "x.trip",
+                            says="scene.json: is a scene file; `triptych render` draws it")
         self.leaves_nothing(2, "render", "scene.json", "-o", "x.png", "--spacing", "1,1,1", says="--spacing")
         self.leaves_nothing(2, "render", "scene.json", "-o", "x.png", "--classify", "pre", says="--classify")
         for name in "scene.json", "c.trip":

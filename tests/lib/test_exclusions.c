@@ -99,11 +99,11 @@ static void settings_of_splats_are_named(void **state)
 }
 
 /* Returns the failure of settings for a kind of data; "" if they apply. */
-static const char *kind_failure(const draw_settings *s, const triptych_resources *r, bool is_scene)
+static const char *kind_failure(const draw_settings *s, const triptych_resources *r, draw_kind kind)
 {
     trip_scope scope = { .sink = keep }, *before = trip_scope_enter(&scope);
     line[0] = 0;
-    const int status = draw_settings_check_kind(s, r, is_scene);
+    const int status = draw_settings_check_kind(s, r, kind);
     trip_scope_enter(before);
     assert_int_equal(status, line[0] ? -2 : 0);
     return line;
@@ -114,36 +114,45 @@ static void settings_of_another_kind_of_data_are_refused_and_dropped(void **stat
     (void)state;
     static const struct {
         const char *options;
-        bool is_scene;
+        draw_kind kind;
         const char *says, *kept;
     } cases[] = {
-        { "--effects occlusion --order lists", true, "--effects: does not apply",
+        { "--effects occlusion --order lists", DRAW_SCENES, "--effects: does not apply",
           " --order lists" },
-        { "--h 0.5", true, "--h: does not apply to scenes with --order depth", "" },
-        { "--h 0.5 --order depth", true, "--h: does not apply", " --order depth" },
-        { "--h 0.5 --method axis --order lists", true, "", " --h 0.5 --method axis --order lists" },
-        { "--kernel fixed --samples 2", true, "fixed does not apply", " --samples 2" },
-        { "--kernel ewa --sh 1", true, "", " --kernel ewa --sh 1" },
-        { "--method image --order lists", true, "image does not apply", " --order lists" },
-        { "--clip-box voxels:0,0,0,1,1,1", true, "voxels: does not apply", "" },
-        { "--clip-box 0,0,0,1,1,1", true, "", " --clip-box 0,0,0,1,1,1" },
-        { "--order depth --quality high", false, "--order: applies to Gaussian scenes only",
+        { "--h 0.5", DRAW_SCENES, "--h: does not apply to scenes with --order depth", "" },
+        { "--h 0.5 --order depth", DRAW_SCENES, "--h: does not apply", " --order depth" },
+        { "--h 0.5 --method axis --order lists", DRAW_SCENES, "",
+          " --h 0.5 --method axis --order lists" },
+        { "--kernel fixed --samples 2", DRAW_SCENES, "fixed does not apply", " --samples 2" },
+        { "--kernel ewa --sh 1", DRAW_SCENES, "", " --kernel ewa --sh 1" },
+        { "--method image --order lists", DRAW_SCENES, "image does not apply", " --order lists" },
+        { "--clip-box voxels:0,0,0,1,1,1", DRAW_SCENES, "voxels: does not apply", "" },
+        { "--clip-box 0,0,0,1,1,1", DRAW_SCENES, "", " --clip-box 0,0,0,1,1,1" },
+        { "--order depth --quality high", DRAW_A_VOLUME, "--order: applies to Gaussian scenes only",
           " --quality high" },
-        { "--sh 0", false, "--sh: applies to Gaussian scenes only", "" },
-        { "--method image --h 0.5", false, "", " --h 0.5 --method image" },
+        { "--sh 0", DRAW_A_VOLUME, "--sh: applies to Gaussian scenes only", "" },
+        { "--method image --h 0.5", DRAW_A_VOLUME, "", " --h 0.5 --method image" },
+        { "--lod 2", DRAW_OBJECTS, "--lod: does not apply to a picture with volumes", "" },
+        { "--lod 0", DRAW_OBJECTS, "", " --lod 0" },
+        { "--order lists --sh 1", DRAW_OBJECTS, "--order: lists does not apply", " --sh 1" },
+        { "--order depth --classify post --effects occlusion", DRAW_OBJECTS, "",
+          " --effects occlusion --classify post --order depth" },
+        { "--show merge --h 0.5", DRAW_OBJECTS, "--show: does not apply", " --h 0.5" },
+        { "--max-ms 20", DRAW_OBJECTS, "--max-ms: does not apply", "" },
+        { "--clip-box voxels:0,0,0,1,1,1", DRAW_OBJECTS, "voxels: does not apply", "" },
     };
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         const triptych_resources none = { 0 };
         draw_settings s = { .has_background = 0 };
         assert_int_equal(draw_settings_read_text(&s, cases[i].options), 0);
-        const char *said = kind_failure(&s, &none, cases[i].is_scene);
+        const char *said = kind_failure(&s, &none, cases[i].kind);
         if (cases[i].says[0] ? !strstr(said, cases[i].says) : said[0] != 0)
             fail_msg("%s: \"%s\"", cases[i].options, said);
-        draw_settings_drop_kind(&s, cases[i].is_scene);
+        draw_settings_drop_kind(&s, cases[i].kind);
         char *kept = draw_settings_text(&s);
         assert_string_equal(kept, cases[i].kept);
         free(kept);
-        assert_string_equal(kind_failure(&s, &none, cases[i].is_scene), "");
+        assert_string_equal(kind_failure(&s, &none, cases[i].kind), "");
     }
 }
 

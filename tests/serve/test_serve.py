@@ -380,6 +380,30 @@ class Serve(program.ProgramTest):
         self.assertEqual(self.server.returncode, 0)
         self.assertTrue(program.LINE.fullmatch(err.decode()), err)
 
+    def test_a_scene_file_with_a_volume_equals_render(self):
+        self.serve_scene()  # writes scene.ply
+        objects = [{"data": "scene.ply"}, {"data": "v.nhdr", "scale": 0.1, "translate": [-1, -1, -1]}]
+        program.write("objects.json", json.dumps({"objects": objects}).encode())
+        self.serve_scene("objects.json")
+        before, number, _ = self.scene_picture(data="objects.json")
+        status = self.status()
+        self.assertTrue(status["scene"]["text"].startswith("1 volume and 1 scene, 800 Gaussians by depth, "), status)
+        self.assertEqual([c["name"] for c in status["scene"]["choices"]], ["kernel", "sh"])
+        applies = status["scene"]["applies"]
+        for name in "lod", "max-ms", "show", "sheet", "depth", "count":
+            self.assertNotIn(name, applies)
+        self.assertEqual({"light", "switches"} & set(status), set())
+        for name, value in (("kernel", "exact"), ("opacity", "3"), ("no-shading", "1"), ("classify", "post"),
+                            ("background", "#204060"), ("clip-plane", "1,0,0,0")):
+            self.assertEqual(self.ask("/set", "POST", name=name, value=value)[0], 204, name)
+            picture, number, _ = self.scene_picture(number, "objects.json")
+            self.assertTrue((picture != before).any(), name)
+            before = picture
+        for name, value in ("order", "lists"), ("show", "lists"), ("lod", "2"), ("effects", "occlusion"):
+            if name != "effects":
+                self.assertEqual(self.ask("/set", "POST", name=name, value=value)[0], 400, name)
+        self.assertEqual(self.ask("/function", "POST", name="bone")[0], 400)
+
     def test_a_volume_is_bricked_and_shown(self):
         cache = tempfile.TemporaryDirectory(prefix="trip-cache-")  # no data set keeps more values
         self.addCleanup(cache.cleanup)

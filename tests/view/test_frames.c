@@ -464,6 +464,57 @@ static void a_part_of_a_picture_has_no_statistics(void **state)
     triptych_destroy(t);
 }
 
+/* Draws a picture in as many steps as a deadline in the past makes. Returns their number. */
+static int draw_in_steps(triptych *t, float *rgba)
+{
+    int status, steps = 0;
+    assert_int_equal(triptych_begin(t), 0);
+    while ((status = triptych_step(t, 0)) > 0) {
+        steps += status == TRIPTYCH_STEP_MORE;
+        if (status == TRIPTYCH_STEP_WAITS)
+            assert_int_equal(triptych_await(t, 10000000), 0);
+    }
+    assert_int_equal(status, 0);
+    assert_int_equal(triptych_picture(t, rgba), 0);
+    triptych_end(t);
+    return steps;
+}
+
+/* A volume beside a scene is drawn in at most 48 slabs, and a step may end inside a slab. A frame
+ * that is abandoned there leaves nothing behind. */
+static void steps_end_inside_a_volume_beside_a_scene(void **state)
+{
+    (void)state;
+    enum { SLABS = 48, OBJECTS = 2, PIXELS = WIDTH * HEIGHT * 4 };
+    char path[64];
+    triptych *t;
+    float *whole, *steps;
+    triptych_scene scene;
+    const triptych_view view = { .width = WIDTH, .height = HEIGHT };
+    brick_scene("beside", 200, path);
+    const triptych_object objects[OBJECTS] = {
+        { .path = data, .matrix = { { 0.1, 0, 0, -1 }, { 0, 0.1, 0, -1 }, { 0, 0, 0.1, -1 } } },
+        { .path = path, .matrix = TRIPTYCH_UNPLACED },
+    };
+    assert_int_equal(triptych_create(&t), 0);
+    assert_int_equal(triptych_open_objects(t, objects, OBJECTS, NULL), 0);
+    assert_int_equal(triptych_get_scene(t, &scene), 0);
+    assert_true(scene.objects == 2 && scene.volumes == 1 && scene.gaussians == 200 && scene.moved);
+    assert_int_equal(triptych_new_picture(t, WIDTH, HEIGHT, 4, &whole), 0);
+    assert_int_equal(triptych_new_picture(t, WIDTH, HEIGHT, 4, &steps), 0);
+    assert_int_equal(triptych_set_view(t, &view), 0);
+    assert_int_equal(triptych_draw(t, whole), 0);
+    for (int i = 1; i < 100; i += 7) { /* abandons frames */
+        assert_int_equal(triptych_begin(t), 0);
+        for (int k = 0; k < i; k++)
+            assert_true(triptych_step(t, 0) > 0);
+        triptych_end(t);
+    }
+    assert_true(draw_in_steps(t, steps) > (SLABS + 2) * (OBJECTS + 1));
+    assert_memory_equal(whole, steps, PIXELS * sizeof *whole);
+    triptych_destroy(t);
+}
+
 static void a_scene_is_described_and_drawn_as_by_the_library(void **state)
 {
     (void)state;
@@ -515,6 +566,7 @@ int main(void)
         cmocka_unit_test(a_pixel_of_the_picture_can_be_probed),
         cmocka_unit_test(a_slow_picture_of_a_scene_grows_from_front_to_back),
         cmocka_unit_test(a_part_of_a_picture_has_no_statistics),
+        cmocka_unit_test(steps_end_inside_a_volume_beside_a_scene),
         cmocka_unit_test(a_scene_is_described_and_drawn_as_by_the_library),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);

@@ -77,6 +77,47 @@ static void the_line_has_count_order_time_and_memory(void **state)
     assert_string_equal(cut, "250000 Gaus");
 }
 
+static void objects_have_only_the_entries_that_apply_to_all(void **state)
+{
+    (void)state;
+    static const draw_settings none = { .has_background = 0 };
+    const triptych_scene scenes = { .gaussians = 9, .objects = 2, .moved = 1 };
+    const triptych_scene both = { .gaussians = 9, .objects = 3, .volumes = 1, .moved = 1 };
+    const triptych_scene volumes = { .objects = 2, .volumes = 2, .moved = 1 };
+    trip_scene_entry e[TRIP_SCENE_ENTRIES];
+    int chosen;
+    assert_int_equal(trip_scene_entries(choice_of(DRAW_ORDER), &scenes, &none, e, &chosen), 2);
+    assert_string_equal(e[1].value, "lists");
+    assert_int_equal(trip_scene_entries(choice_of(DRAW_FOOTPRINT), &scenes, &none, e, &chosen), 3);
+    assert_int_equal(trip_scene_entries(choice_of(DRAW_ORDER), &both, &none, e, &chosen), 1);
+    assert_int_equal(trip_scene_entries(choice_of(DRAW_FOOTPRINT), &both, &none, e, &chosen), 3);
+    for (int i = 0; i < TRIP_SCENE_CHOICES; i++)
+        assert_true(trip_scene_entries(&trip_scene_choices[i], &volumes, &none, e, &chosen) < 2);
+}
+
+static void the_line_names_the_objects(void **state)
+{
+    (void)state;
+    static const draw_settings none = { .has_background = 0 };
+    static const struct {
+        triptych_scene scene;
+        const char *says;
+    } cases[] = {
+        { { .gaussians = 7, .objects = 1 }, "7 Gaussians by depth" },
+        { { .gaussians = 7, .objects = 2 }, "2 scenes, 7 Gaussians by depth" },
+        { { .gaussians = 7, .objects = 2, .volumes = 1 },
+          "1 volume and 1 scene, 7 Gaussians by depth" },
+        { { .gaussians = 7, .objects = 5, .volumes = 2 },
+          "2 volumes and 3 scenes, 7 Gaussians by depth" },
+        { { .objects = 2, .volumes = 2 }, "2 volumes" },
+    };
+    char text[160];
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        trip_scene_say(&cases[i].scene, &none, NULL, text, sizeof text);
+        assert_string_equal(text, cases[i].says);
+    }
+}
+
 static void the_bounds_are_those_that_views_fit(void **state)
 {
     (void)state;
@@ -97,6 +138,8 @@ int main(void)
         cmocka_unit_test(every_order_of_the_library_is_an_entry),
         cmocka_unit_test(entries_that_a_scene_lacks_are_left_out),
         cmocka_unit_test(the_line_has_count_order_time_and_memory),
+        cmocka_unit_test(objects_have_only_the_entries_that_apply_to_all),
+        cmocka_unit_test(the_line_names_the_objects),
         cmocka_unit_test(the_bounds_are_those_that_views_fit),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

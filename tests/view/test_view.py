@@ -521,11 +521,11 @@ class View(program.ProgramTest):
 
     # ---- Gaussian scenes ----
 
-    def expect_render(self, name, status, data="scene.trip"):
+    def expect_render(self, name, status, data="scene.trip", options=()):
         """The picture NAME.exr has the bits of `render` with the options of the status."""
         camera = shlex.split(self.status(status)["camera"])
         background = [] if "--background" in camera else ["--background=0,0,0"]
-        self.works("render", data, *camera, *background, "-o", "drawn.exr")
+        self.works("render", data, *camera, *options, *background, "-o", "drawn.exr")
         with open(f"{name}.exr", "rb") as seen, open("drawn.exr", "rb") as drawn:
             self.assertEqual(seen.read(), drawn.read(), camera)
 
@@ -670,6 +670,102 @@ class View(program.ProgramTest):
         status = self.status()
         self.assertTrue(status["failed"] and "raise --memory" in status["message"], status)
         self.assertNotIn("\n", status["message"])
+
+    # ---- scene files ----
+
+    def write_objects(self):
+        """Writes scene files with 1600 Gaussians in two objects, and with 800 beside a volume."""
+        turned = {"data": "scene.ply", "translate": [2, 0.5, 0], "scale": 0.5,
+                  "rotate": {"axis": [0, 1, 0], "degrees": 50}}
+        for name, objects in (("scenes", [{"data": "scene.trip"}, turned]),
+                              ("mixed", [{"data": "scene.ply"},
+                                         {"data": "noise.nrrd", "scale": 0.1, "translate": [-1, -1, -1]}])):
+            program.write(f"{name}.json", json.dumps({"objects": objects}).encode())
+
+    def test_scene_files_show_the_picture_of_render(self):
+        self.write_objects()
+        for name, options, counts in (("scenes", ["--order=lists"], (2, 0, 1600)), ("mixed", [], (2, 1, 800)),
+                                      ("mixed", ["--classify=post", "--tf=bone", "--lod=0"], (2, 1, 800))):
+            self.view("wait\npicture 0.exr\nstatus 0.json\ndrag left 100 100 150 120 4\nwait\npicture 1.exr\n"
+                      "status 1.json\nclick 0.7 Opacity\nkey o\nset --clip-plane 1,0,0,0.2\nwait\npicture 2.exr\n"
+                      "status 2.json\n", f"{name}.json", *options)
+            tf = [option for option in options if option.startswith("--tf")]
+            for i in range(3):
+                status = self.status(f"{i}.json")
+                self.assertTrue(status["exact"] and not status["failed"], status)
+                self.assertEqual((status["objects"], status["volumes"], status["gaussians"]), counts)
+                drawn = program.read_exr(f"{i}.exr")
+                self.expect_render(i, f"{i}.json", f"{name}.json", tf if "--tf" not in status["camera"] else [])
+                self.assertTrue(i == 0 or (drawn != program.read_exr(f"{i - 1}.exr")).any())
+
+    def test_a_scene_file_is_bricked_once(self):
+        self.write_objects()
+        with tempfile.TemporaryDirectory(prefix="trip-cache-") as cache, \
+                unittest.mock.patch.dict(self.screen.environment, XDG_CACHE_HOME=cache), \
+                unittest.mock.patch.dict(os.environ, XDG_CACHE_HOME=cache):
+            self.view("wait\nstatus status.json\n", "mixed.json")
+            self.assertTrue(self.status()["exact"])
+            self.assertNotIn("bricked", self.works("render", "mixed.json", "-o", "r.png").stdout)
+            shutil.rmtree(cache)
+            os.mkdir(cache)
+            self.assertIn("2 of its 2 objects bricked", self.works("render", "mixed.json", "-o", "r.png").stdout)
+
+    def test_controls_that_do_not_apply_to_objects_are_hidden(self):
+        self.write_objects()
+        self.view("wait\nclick 0.5 Variants of the papers\nwait\nclick 0.5 Order\nwait\nstatus scenes.status\n"
+                  "key esc\nkey tab\nwait\nstatus mixed.status\n", "scenes.json", "mixed.json")
+        scenes, mixed = (set(self.status(f"{n}.status")["controls"]) for n in ("scenes", "mixed"))
+        self.assertEqual({"Lists", "Sheets"} & scenes, {"Lists"})
+        gone = {"Order", "Level of detail", "Transfer function", "Function editor", "Preset", "Light", "Effects",
+                "Quality preset", "Debug view", "Probe"}
+        self.assertEqual(mixed & gone, set())
+        self.assertEqual({"Scene", "Footprint", "Opacity", "Background", "Antialiasing", "Clipping", "Box"} - mixed,
+                         set())
+
+    def test_scene_files_can_be_dropped_and_their_state_is_kept(self):
+        self.write_objects()
+        program.write("f.tf", b"triptych 1\n")
+        shutil.rmtree("state", ignore_errors=True)
+        dropped = f"wait\ndrop {os.path.abspath('mixed.json')}\nwait\n"
+        self.view(dropped + "picture seen.exr\nstatus status.json\n", "ball.trip")
+        self.expect_render("seen", "status.json", "mixed.json")
+        last, again = (self.pictures(script + "wait\npicture seen.exr\n", ["seen"], "mixed.json", fresh=False)[0]
+                       for script in (f"wait\nset --kernel exact\nkey 2\ndrop {os.path.abspath('f.tf')}\n", ""))
+        self.assertTrue((last == again).all())
+        self.assertTrue((last != program.read_exr("drawn.exr")).any())
+        shutil.rmtree("state")
+
+    def test_faults_of_scene_files_are_one_line(self):
+        self.write_objects()
+        program.write("bare.nrrd", b"not a volume")
+        file = lambda *objects: json.dumps({"objects": objects}).encode()
+        bad = ((b"{", "is not JSON"), (file(), "1 to 1000 objects"), (file({"data": "none.ply"}), "none.ply"),
+               (file({"data": "none.trip"}), "none.trip"), (file({"data": "bad.json"}), "is a scene file itself"),
+               (file({"data": "scene.ply", "tf": "bone"}), "leave out tf"),
+               (file({"data": "noise.nrrd", "tf": "none.tf"}), "none.tf"),
+               (file({"data": "bare.nrrd", "scale": 2}), "bare.nrrd"),
+               (file({"data": "scene.ply", "scale": 0}), "scale must be above 0"))
+        for text, says in bad:
+            program.write("bad.json", text)
+            for command in ("view", "bad.json"), ("serve", "bad.json"):
+                run = program.call(*command, env=self.screen.environment, timeout=60)
+                self.assertIn(run.returncode, (1, 2), (text, run.stderr))
+                self.assertTrue(program.LINE.fullmatch(run.stderr) and says in run.stderr, run.stderr)
+            self.view(f"wait\ndrop {os.path.abspath('bad.json')}\nwait\nstatus bad.status\nkey tab\nwait\n"
+                      "status good.status\n", "mixed.json")
+            status = self.status("bad.status")
+            self.assertTrue(status["failed"] and says in status["message"], (text, status["message"]))
+            self.assertTrue(self.status("good.status")["exact"])
+
+    def test_options_that_do_not_apply_to_objects_are_refused_before_a_window_opens(self):
+        self.write_objects()
+        for name, option in (("mixed", "--order=lists"), ("mixed", "--lod=2"), ("mixed", "--show=merge"),
+                             ("mixed", "--error=1"), ("mixed", "--spacing=1,1,1"), ("mixed", "--max-ms=5"),
+                             ("scenes", "--order=sheets"), ("scenes", "--tf=bone"), ("scenes", "--effects=occlusion")):
+            for command in "view", "serve":
+                said = self.leaves_nothing(2, command, f"{name}.json", option, says=option.partition("=")[0],
+                                           env=self.screen.environment).stderr
+                self.assertTrue(program.LINE.fullmatch(said), said)
 
 
 skip_what_is_missing()
