@@ -141,11 +141,11 @@ static int check_objects(const drawing *d)
     const render_options *o = &d->o;
     int status = placed_input_check(&d->placed, d->t, &o->settings, &o->resources, &o->function);
     if (!status && o->quality.error > 0)
-        status = trip_option_fail("--error", TRIP_NOT_OF_OBJECTS);
+        status = library_fail_objects_option("error");
     if (!status && o->field == RENDER_FIELD_SOURCE)
         status = trip_option_fail("--field", "source does not apply to objects with places");
     if (!status && o->heat)
-        status = trip_option_fail("--emission", "does not apply to objects with places");
+        status = library_fail_objects_option("emission");
     return status;
 }
 

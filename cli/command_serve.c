@@ -118,6 +118,8 @@ static int check_input(const serve_options *o)
     int status = library_create(&t, NULL);
     if (!status)
         status = viewed_volume_check(&o->volume, t, p->input, &o->resources);
+    if (!status && p->heat && triptych_is_scene_file(p->input))
+        status = library_fail_objects_option("emission");
     if (!status)
         status = library_check_heat(t, p->heat, &o->resources);
     triptych_destroy(t);

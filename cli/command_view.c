@@ -185,6 +185,8 @@ static int check_inputs(view_command *o)
     int status = library_create(&t, NULL);
     for (int i = 0; i < o->params.count && !status; i++)
         status = viewed_volume_check(&o->volume, t, o->inputs[i], &o->resources);
+    if (!status && o->params.heat && triptych_is_scene_file(o->inputs[0]))
+        status = library_fail_objects_option("emission");
     if (!status)
         status = library_check_heat(t, o->params.heat, &o->resources);
     if (!status && o->params.script)

@@ -62,6 +62,13 @@ int library_fail_scene_option(const char *name)
     return trip_option_fail(option, "does not apply to Gaussian scenes");
 }
 
+int library_fail_objects_option(const char *name)
+{
+    char option[64];
+    snprintf(option, sizeof option, "--%s", name);
+    return trip_option_fail(option, "does not apply to several objects in one picture");
+}
+
 int library_check_scene_options(const triptych_brick_options *options)
 {
     if (options->spacing[0] != 0) /* the table looks at a part of a number */

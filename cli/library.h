@@ -24,6 +24,8 @@ int library_check_kind(triptych *t, const char *input, const draw_settings *sett
                        const triptych_transfer_function *function);
 /* Fails: an option does not apply to Gaussian scenes. */
 int library_fail_scene_option(const char *name);
+/* Fails: an option does not apply to a scene file, or to inputs with places. */
+int library_fail_objects_option(const char *name);
 /* Fails if options for reading a volume were given for a Gaussian scene. */
 int library_check_scene_options(const triptych_brick_options *options);
 /* Whether an input is a Gaussian scene, or a scene file. */

@@ -5,8 +5,6 @@
 
 #include "cached_volume.h"
 
-#define TRIP_NOT_OF_OBJECTS "does not apply to several objects in one picture"
-
 /* Zeroed before its first use. Without objects, one data set is the input. */
 typedef struct placed_input {
     triptych_object *objects; /* of data sets */

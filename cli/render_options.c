@@ -203,6 +203,8 @@ static int check(void *user)
 /* Takes the settings of --error from its report. */
 static int use_report(render_options *o, uint64_t given)
 {
+    if (o->quality.error > 0 && (triptych_is_scene_file(o->input) || o->place))
+        return library_fail_objects_option("error");
     int status = quality_options_use(&o->quality, &(quality_drawn){ o->input, o->function.name },
                                      &o->settings, &o->resources.renderer, true);
     return status ? status : check_settings(o, given);

@@ -41,6 +41,8 @@ static int pass_file(void *user, const char *path)
 int viewed_volume_choose(viewed_volume *s, quality_options *q, const char *input,
                          draw_settings *settings, triptych_renderer *renderer)
 {
+    if (q->error > 0 && input && triptych_is_scene_file(input))
+        return library_fail_objects_option("error");
     int status =
         quality_options_use(q, &(quality_drawn){ input, s->function }, settings, renderer, false);
     /* A moving view is drawn from coarse levels by this classification. */
@@ -86,8 +88,6 @@ static int check_objects(const viewed_volume *s, triptych *t, const char *input,
     int status = triptych_read_scene_file(t, input, &p.given, &p.count);
     if (!status)
         status = library_check_scene_options(&s->options);
-    if (!status && s->measured)
-        status = trip_option_fail("--error", TRIP_NOT_OF_OBJECTS);
     if (!status)
         status = placed_input_check(&p, t, s->settings, resources,
                                     &(triptych_transfer_function){ .name = s->function });

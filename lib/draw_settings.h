@@ -127,7 +127,7 @@ int draw_settings_check_ranges(const draw_settings *s);
 /* Checks every range and rule, as triptych_check_settings() does. With `idle_too`, also refuses
  * settings that only have no effect. */
 int draw_settings_check(const draw_settings *s, triptych_renderer *renderer, bool idle_too);
-/* What a picture shows. The order matters: a truth value tells scenes from a volume. */
+/* Kind of the data in a picture. DRAW_A_VOLUME is 0. */
 typedef enum draw_kind {
     DRAW_A_VOLUME,
     DRAW_SCENES, /* Gaussian scenes alone */

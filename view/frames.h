@@ -37,7 +37,7 @@ typedef struct trip_frames_params {
      * Failures are reported in the context or the thread's scope. */
     int (*find)(void *user, triptych *t, const char *input, bool keep_all, bool *small,
                 const char **path);
-    /* Called by the drawing thread. Opens what find() found. NULL means triptych_open(). */
+    /* Called by the drawing thread. Opens the result of find(). NULL means triptych_open(). */
     int (*open)(void *user, triptych *t, const char *path, const triptych_resources *resources);
     void (*release)(void *user);
     void *user;

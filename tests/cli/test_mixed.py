@@ -161,6 +161,9 @@ class Mixed(program.ProgramTest):
         for options in ("--depth", "z.exr"), ("--order", "lists"), ("--lod", "1"), ("--show", "merge"):
             self.leaves_nothing(2, "render", "a.json", "-o", "a.png", *options,
                                 says="does not apply to a picture with volumes beside other objects")
+        for options in ("--error", "1"), ("--emission", "fog.trip", "--effects", "emission"):
+            self.leaves_nothing(2, "render", "a.json", "-o", "a.png", *options,
+                                says=f"{options[0]}: does not apply to several objects in one picture")
         for bad in {"tf": 3}, {"tf": ""}, {"tf": "missing.tf"}:
             write_objects("b.json", {**fog_object("fog"), **bad})
             self.assertNotEqual(program.call("render", "b.json", "-o", "a.png").returncode, 0)

@@ -399,9 +399,8 @@ class Serve(program.ProgramTest):
             picture, number, _ = self.scene_picture(number, "objects.json")
             self.assertTrue((picture != before).any(), name)
             before = picture
-        for name, value in ("order", "lists"), ("show", "lists"), ("lod", "2"), ("effects", "occlusion"):
-            if name != "effects":
-                self.assertEqual(self.ask("/set", "POST", name=name, value=value)[0], 400, name)
+        for name, value in ("order", "lists"), ("show", "lists"), ("lod", "2"):
+            self.assertEqual(self.ask("/set", "POST", name=name, value=value)[0], 400, name)
         self.assertEqual(self.ask("/function", "POST", name="bone")[0], 400)
 
     def test_a_volume_is_bricked_and_shown(self):

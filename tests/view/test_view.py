@@ -109,7 +109,7 @@ class View(program.ProgramTest):
             with open("seen.exr", "rb") as seen, open("drawn.exr", "rb") as drawn:
                 self.assertEqual(seen.read(), drawn.read())
 
-    GLOWS = ["noise.trip", "--effects=emission,cueing", "--emission=heat.trip",
+    GLOWS = ["noise.trip", "--effects=emission,cueing", "--emission=heat.trip --effects=emission",
              "--temperature=500:3000"]
 
     def test_emission_equals_render(self):
@@ -705,15 +705,15 @@ class View(program.ProgramTest):
                 unittest.mock.patch.dict(os.environ, XDG_CACHE_HOME=cache):
             self.view("wait\nstatus status.json\n", "mixed.json")
             self.assertTrue(self.status()["exact"])
-            self.assertNotIn("bricked", self.works("render", "mixed.json", "-o", "r.png").stdout)
+            self.assertNotIn(b"bricked", self.works("render", "mixed.json", "-o", "r.png").stdout)
             shutil.rmtree(cache)
             os.mkdir(cache)
-            self.assertIn("2 of its 2 objects bricked", self.works("render", "mixed.json", "-o", "r.png").stdout)
+            self.assertIn(b"2 of its 2 objects bricked", self.works("render", "mixed.json", "-o", "r.png").stdout)
 
     def test_controls_that_do_not_apply_to_objects_are_hidden(self):
         self.write_objects()
         self.view("wait\nclick 0.5 Variants of the papers\nwait\nclick 0.5 Order\nwait\nstatus scenes.status\n"
-                  "key esc\nkey tab\nwait\nstatus mixed.status\n", "scenes.json", "mixed.json")
+                  "click 0.5 Lists\nwait\nkey tab\nwait\nstatus mixed.status\n", "scenes.json", "mixed.json")
         scenes, mixed = (set(self.status(f"{n}.status")["controls"]) for n in ("scenes", "mixed"))
         self.assertEqual({"Lists", "Sheets"} & scenes, {"Lists"})
         gone = {"Order", "Level of detail", "Transfer function", "Function editor", "Preset", "Light", "Effects",
@@ -760,10 +760,10 @@ class View(program.ProgramTest):
     def test_options_that_do_not_apply_to_objects_are_refused_before_a_window_opens(self):
         self.write_objects()
         for name, option in (("mixed", "--order=lists"), ("mixed", "--lod=2"), ("mixed", "--show=merge"),
-                             ("mixed", "--error=1"), ("mixed", "--spacing=1,1,1"), ("mixed", "--max-ms=5"),
+                             ("mixed", "--error=1"), ("mixed", "--emission=heat.trip"), ("mixed", "--spacing=1,1,1"), ("mixed", "--max-ms=5"),
                              ("scenes", "--order=sheets"), ("scenes", "--tf=bone"), ("scenes", "--effects=occlusion")):
             for command in "view", "serve":
-                said = self.leaves_nothing(2, command, f"{name}.json", option, says=option.partition("=")[0],
+                said = self.leaves_nothing(2, command, f"{name}.json", *option.split(), says=option.partition("=")[0],
                                            env=self.screen.environment).stderr
                 self.assertTrue(program.LINE.fullmatch(said), said)
 
