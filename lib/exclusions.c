@@ -327,8 +327,8 @@ static const uint64_t of_both =
     ROW(BACKGROUND) | ROW(CLIP_BOX) | ROW(CLIP_PLANE) | ROW(EARLY_TERMINATION) | ROW(FOOTPRINT) |
     ROW(SAMPLES) | ROW(DEPTH) | ROW(NORMALISE) | ROW(METHOD) | ROW(H) | ROW(LOD) | ROW(TOLERANCE);
 
-static const uint64_t not_of_objects = ROW(SHEET) | ROW(DEPTH) | ROW(LOD) | ROW(MAX_BYTES) |
-                                       ROW(MAX_MS) | ROW(SHOW) | ROW(COUNT) | ROW(TEMPERATURE);
+static const uint64_t not_of_objects = ROW(SHEET) | ROW(LOD) | ROW(MAX_BYTES) | ROW(MAX_MS) |
+                                       ROW(SHOW) | ROW(COUNT) | ROW(TEMPERATURE);
 
 #define NOT_OF_OBJECTS "does not apply to a picture with volumes beside other objects"
 

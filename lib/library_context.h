@@ -223,7 +223,7 @@ int trip_context_begin_mixed(triptych *t, int side);
 int trip_context_step_mixed(triptych *t, uint64_t deadline_ns);
 /* Waits until the volume of the begun frame has data to draw. */
 void trip_context_await_mixed(const triptych *t, uint64_t timeout_ns);
-int trip_context_take_mixed(triptych *t, float *rgba);
+int trip_context_take_mixed(triptych *t, float *rgba, float *depth);
 void trip_context_end_mixed(triptych *t);
 void trip_context_add_mixed_stats(const triptych *t, triptych_frame_stats *stats);
 void trip_context_explain_mixed(const triptych *t, FILE *out);

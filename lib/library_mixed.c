@@ -34,8 +34,7 @@ struct trip_mixed {
     unsigned cut_count;
     unsigned slab, next; /* slab 0 ends at cuts[0], the last one is open; the next volume in it */
     bool drawing;        /* the frame of volume `next` is begun */
-    size_t pixels;
-    trip_mixture_pixel *mixture;
+    trip_mixture mixture;
     float *picture, *distances;
 };
 
@@ -246,7 +245,7 @@ static int use_settings(triptych *t, const volume *v, int side)
 {
     draw_settings s = t->given;
     s.scene = (triptych_scene_settings){ 0 };
-    s.all.normalise = s.all.depth = s.all.count_exactly = 0;
+    s.all.normalise = s.all.count_exactly = 0;
     s.all.samples = side > 1 ? 1 : s.all.samples;
     s.has_background = 1;
     memset(s.background, 0, sizeof s.background);
@@ -308,11 +307,15 @@ static int take_memory(triptych *t)
 {
     struct trip_mixed *m = t->mixed;
     trip_budget *budget = t->session.budget;
-    m->pixels = (size_t)t->camera.width * (size_t)t->camera.height;
-    m->mixture = trip_budget_take(budget, m->pixels * sizeof *m->mixture);
-    m->picture = trip_budget_take(budget, m->pixels * 4 * sizeof(float));
-    m->distances = trip_budget_take(budget, m->pixels * sizeof(float));
-    return m->mixture && m->picture && m->distances
+    trip_mixture *x = &m->mixture;
+    const size_t pixels = (size_t)t->camera.width * (size_t)t->camera.height;
+    const bool far = t->given.all.depth;
+    x->count = pixels;
+    x->pixels = trip_budget_take(budget, pixels * sizeof *x->pixels);
+    x->distances = far ? trip_budget_take(budget, pixels * sizeof *x->distances) : NULL;
+    m->picture = trip_budget_take(budget, pixels * 4 * sizeof(float));
+    m->distances = trip_budget_take(budget, pixels * sizeof(float));
+    return x->pixels && (x->distances || !far) && m->picture && m->distances
                ? 0
                : trip_fail(TRIP_ERROR, "render", "memory",
                            "the pictures of several objects do not fit; raise --memory or lower "
@@ -337,7 +340,7 @@ int trip_context_begin_mixed(triptych *t, int side)
     m->cut_count = trip_mixture_cut(depths, m->count, depths_of_scenes(t), m->cuts);
     m->slab = m->next = 0;
     m->drawing = false;
-    trip_mixture_begin(m->mixture, m->pixels);
+    trip_mixture_begin(&m->mixture);
     return 0;
 }
 
@@ -414,9 +417,10 @@ static int draw_next(triptych *t, trip_depth_range slab, uint64_t deadline_ns)
     if (status > 0)
         return status;
     if (!status)
-        status = triptych_picture(v->t, m->picture);
+        status = m->mixture.distances ? triptych_picture_and_depth(v->t, m->picture, m->distances)
+                                      : triptych_picture(v->t, m->picture);
     if (!status)
-        trip_mixture_add(m->mixture, m->picture, m->pixels);
+        trip_mixture_add(&m->mixture, m->picture, m->distances, v->scale);
     end_volume(m);
     if (!status)
         note_stats(v);
@@ -437,7 +441,7 @@ static int end_slab(triptych *t, trip_depth_range slab, uint64_t deadline_ns)
         status = trip_gaussian_frame_picture(t->scene_frame, m->picture, m->distances);
     if (status)
         return status;
-    trip_mixture_end_slab(m->mixture, &t->camera, slab, t->scene_frame ? m->picture : NULL,
+    trip_mixture_end_slab(&m->mixture, &t->camera, slab, t->scene_frame ? m->picture : NULL,
                           m->distances);
     m->slab++;
     m->next = 0;
@@ -462,11 +466,13 @@ int trip_context_step_mixed(triptych *t, uint64_t deadline_ns)
     return status;
 }
 
-int trip_context_take_mixed(triptych *t, float *rgba)
+int trip_context_take_mixed(triptych *t, float *rgba, float *depth)
 {
-    trip_mixture_picture(t->mixed->mixture, t->mixed->pixels, rgba);
+    trip_mixture_picture(&t->mixed->mixture, rgba);
+    if (depth)
+        trip_mixture_write_distances(&t->mixed->mixture, depth);
     if (!t->given.all.normalise)
-        trip_put_behind(rgba, t->mixed->pixels, t->settings.background);
+        trip_put_behind(rgba, t->mixed->mixture.count, t->settings.background);
     return 0;
 }
 
@@ -482,10 +488,12 @@ void trip_context_end_mixed(triptych *t)
     struct trip_mixed *m = t->mixed;
     end_volume(m);
     trip_budget *budget = t->session.budget;
-    trip_budget_release(budget, m->mixture, m->pixels * sizeof *m->mixture);
-    trip_budget_release(budget, m->picture, m->pixels * 4 * sizeof(float));
-    trip_budget_release(budget, m->distances, m->pixels * sizeof(float));
-    m->mixture = NULL;
+    trip_mixture *x = &m->mixture;
+    trip_budget_release(budget, x->pixels, x->count * sizeof *x->pixels);
+    trip_budget_release(budget, x->distances, x->count * sizeof *x->distances);
+    trip_budget_release(budget, m->picture, x->count * 4 * sizeof(float));
+    trip_budget_release(budget, m->distances, x->count * sizeof(float));
+    *x = (trip_mixture){ 0 };
     m->picture = m->distances = NULL;
 }
 

@@ -490,7 +490,7 @@ int trip_context_take_scene(triptych *t, float *rgba, float *depth)
 {
     const int side = t->drawn_settings.samples;
     float *picture = side > 1 ? t->before : rgba;
-    int status = t->mixed ? trip_context_take_mixed(t, picture)
+    int status = t->mixed ? trip_context_take_mixed(t, picture, depth)
                           : trip_gaussian_frame_picture(t->scene_frame, picture, depth);
     if (!status && side > 1)
         trip_context_take_means(picture, side, t->turned.width, t->turned.height, rgba);

@@ -1,6 +1,7 @@
 #include "mixture.h"
 
 #include <math.h>
+#include <string.h>
 #include <stdlib.h>
 
 /* Alpha up to which a slab counts as transparent: its optical depth then equals its alpha. */
@@ -87,31 +88,40 @@ unsigned trip_mixture_cut(const trip_depth_range *volumes, unsigned count, trip_
 
 /* ---- pixels ---- */
 
-void trip_mixture_begin(trip_mixture_pixel *pixels, size_t count)
+void trip_mixture_begin(const trip_mixture *m)
 {
-    for (size_t i = 0; i < count; i++)
-        pixels[i] = (trip_mixture_pixel){ .transmittance = 1 };
+    for (size_t i = 0; i < m->count; i++)
+        m->pixels[i] = (trip_mixture_pixel){ .transmittance = 1 };
+    if (m->distances)
+        memset(m->distances, 0, m->count * sizeof *m->distances);
 }
 
-void trip_mixture_add(trip_mixture_pixel *pixels, const float *rgba, size_t count)
+void trip_mixture_add(const trip_mixture *m, const float *rgba, const float *distances,
+                      double scale)
 {
-    for (size_t i = 0; i < count; i++, rgba += 4) {
+    for (size_t i = 0; i < m->count; i++, rgba += 4) {
+        trip_mixture_pixel *p = &m->pixels[i];
         const double alpha = fmin(OPAQUE, fmax(0, (double)rgba[3]));
         const double tau = -log1p(-alpha), factor = alpha > THIN ? tau / alpha : 1;
         for (int c = 0; c < 3; c++)
-            pixels[i].light[c] += (float)(factor * (double)rgba[c]);
-        pixels[i].tau += (float)tau;
+            p->light[c] += (float)(factor * (double)rgba[c]);
+        p->tau += (float)tau;
+        if (m->distances && tau > 0 && isfinite(distances[i]))
+            m->distances[i].of_slab += (float)(tau * scale * (double)distances[i]);
     }
 }
 
-/* Composites a share of the slab's matter, behind the Gaussians with this transmittance. */
-static void advance(trip_mixture_pixel *p, double share, double gaussians)
+/* Composites a share of the slab's matter, behind the Gaussians with this transmittance. `d` may be
+ * NULL. */
+static void advance(trip_mixture_pixel *p, trip_mixture_distance *d, double share, double gaussians)
 {
     const double tau = share * (double)p->tau, alpha = -expm1(-tau);
-    const double seen =
-        (double)p->transmittance * gaussians * share * (tau > THIN ? alpha / tau : 1);
+    const double all = (double)p->transmittance * gaussians;
+    const double seen = all * share * (tau > THIN ? alpha / tau : 1);
     for (int c = 0; c < 3; c++)
         p->rgb[c] += (float)(seen * (double)p->light[c]);
+    if (d)
+        d->sum += (float)(seen * (double)d->of_slab);
     p->transmittance *= (float)(1 - alpha);
 }
 
@@ -125,40 +135,67 @@ static double place(trip_mixture_pixel *p, const float now[4], double depth, tri
                                           : 1;
 }
 
-void trip_mixture_end_slab(trip_mixture_pixel *pixels, const trip_camera *camera,
-                           trip_depth_range slab, const float *gaussians, const float *distances)
+/* Composites the Gaussians up to the slab's end, in place of those before. */
+static void put_gaussians(trip_mixture_pixel *p, const float now[4])
 {
-    trip_mixture_pixel *p = pixels;
-    for (int y = 0; y < camera->height; y++)
-        for (int x = 0; x < camera->width; x++, p++) {
-            const size_t at = (size_t)(p - pixels);
-            const double before = 1 - (double)p->before[3];
-            double share = 1;
-            if (gaussians && gaussians[4 * at + 3] > p->before[3])
-                share = place(
-                    p, gaussians + 4 * at,
-                    (double)distances[at] / trip_camera_ray_length(camera, x + 0.5, y + 0.5), slab);
-            advance(p, share, before);
-            if (gaussians)
-                for (int c = 0; c < 4; c++) {
-                    if (c < 3)
-                        p->rgb[c] +=
-                            p->transmittance * (gaussians[4 * at + (size_t)c] - p->before[c]);
-                    p->before[c] = gaussians[4 * at + (size_t)c];
-                }
-            if (share < 1)
-                advance(p, 1 - share, 1 - (double)p->before[3]);
-            for (int c = 0; c < 3; c++)
-                p->light[c] = 0;
-            p->tau = 0;
-        }
+    for (int c = 0; c < 4; c++) {
+        if (c < 3)
+            p->rgb[c] += p->transmittance * (now[c] - p->before[c]);
+        p->before[c] = now[c];
+    }
 }
 
-void trip_mixture_picture(const trip_mixture_pixel *pixels, size_t count, float *rgba)
+/* Composites the slab at a pixel. `now` has the Gaussians up to its end, or is NULL. */
+static void end_slab(trip_mixture_pixel *p, trip_mixture_distance *d, trip_depth_range slab,
+                     const float *now, double distance, double stretch)
 {
-    for (size_t i = 0; i < count; i++, rgba += 4) {
+    const double before = 1 - (double)p->before[3], depth = (double)p->depth;
+    double share = 1;
+    if (now && now[3] > p->before[3])
+        share = place(p, now, distance / stretch, slab);
+    advance(p, d, share, before);
+    if (d)
+        d->sum += (float)((double)p->transmittance * ((double)p->depth - depth) * stretch);
+    if (now)
+        put_gaussians(p, now);
+    if (share < 1)
+        advance(p, d, 1 - share, 1 - (double)p->before[3]);
+    for (int c = 0; c < 3; c++)
+        p->light[c] = 0;
+    p->tau = 0;
+    if (d)
+        d->of_slab = 0;
+}
+
+void trip_mixture_end_slab(const trip_mixture *m, const trip_camera *camera, trip_depth_range slab,
+                           const float *gaussians, const float *distances)
+{
+    size_t at = 0;
+    for (int y = 0; y < camera->height; y++)
+        for (int x = 0; x < camera->width; x++, at++)
+            end_slab(&m->pixels[at], m->distances ? &m->distances[at] : NULL, slab,
+                     gaussians ? gaussians + 4 * at : NULL, gaussians ? (double)distances[at] : 0,
+                     trip_camera_ray_length(camera, x + 0.5, y + 0.5));
+}
+
+static float alpha_of(const trip_mixture_pixel *p)
+{
+    return 1 - p->transmittance * (1 - p->before[3]);
+}
+
+void trip_mixture_picture(const trip_mixture *m, float *rgba)
+{
+    for (size_t i = 0; i < m->count; i++, rgba += 4) {
         for (int c = 0; c < 3; c++)
-            rgba[c] = pixels[i].rgb[c];
-        rgba[3] = 1 - pixels[i].transmittance * (1 - pixels[i].before[3]);
+            rgba[c] = m->pixels[i].rgb[c];
+        rgba[3] = alpha_of(&m->pixels[i]);
+    }
+}
+
+void trip_mixture_write_distances(const trip_mixture *m, float *distances)
+{
+    for (size_t i = 0; m->distances && i < m->count; i++) {
+        const float alpha = alpha_of(&m->pixels[i]);
+        distances[i] = alpha > 0 ? m->distances[i].sum / alpha : INFINITY;
     }
 }

@@ -56,15 +56,33 @@ typedef struct trip_mixture_pixel {
     float before[4], depth;      /* the Gaussians so far, and the sum of their alpha times depth */
 } trip_mixture_pixel;
 
+/* The distances at a pixel. The visible distance is the mean over all that the pixel shows,
+ * weighted by its share of alpha. */
+typedef struct trip_mixture_distance {
+    float of_slab; /* the sum of optical depths times distances in the slab */
+    float sum;     /* the sum of visible alphas times distances */
+} trip_mixture_distance;
+
+/* The pixels of a picture. */
+typedef struct trip_mixture {
+    trip_mixture_pixel *pixels;
+    trip_mixture_distance *distances; /* NULL: none are wanted */
+    size_t count;
+} trip_mixture;
+
 /* Begins a picture. */
-void trip_mixture_begin(trip_mixture_pixel *pixels, size_t count);
-/* Adds the picture of one volume in the slab: premultiplied, without background. */
-void trip_mixture_add(trip_mixture_pixel *pixels, const float *rgba, size_t count);
+void trip_mixture_begin(const trip_mixture *m);
+/* Adds the picture of one volume in the slab: premultiplied, without background. `distances`, in
+ * units of 1 / scale, is read only if distances are wanted. */
+void trip_mixture_add(const trip_mixture *m, const float *rgba, const float *distances,
+                      double scale);
 /* Composites the slab. `gaussians` is the picture of all Gaussians up to its end, without
  * background, and `distances` has their distances (layer.h); NULL if there are none. */
-void trip_mixture_end_slab(trip_mixture_pixel *pixels, const trip_camera *camera,
-                           trip_depth_range slab, const float *gaussians, const float *distances);
+void trip_mixture_end_slab(const trip_mixture *m, const trip_camera *camera, trip_depth_range slab,
+                           const float *gaussians, const float *distances);
 /* Writes the picture so far: premultiplied, without background. */
-void trip_mixture_picture(const trip_mixture_pixel *pixels, size_t count, float *rgba);
+void trip_mixture_picture(const trip_mixture *m, float *rgba);
+/* Writes the distances, if they are wanted: infinite where nothing is visible. */
+void trip_mixture_write_distances(const trip_mixture *m, float *distances);
 
 #endif

@@ -71,6 +71,30 @@ def expected(view, rows, *fogs):
     return over(picture, fog_between(view, at, -100, *fogs))
 
 
+def expected_distances(view, rows, fog):
+    """Returns the mean distance of all that each pixel shows, weighted by its share of alpha. Even fog with the
+    optical depth k for each unit of length has the mean 1 / k - L exp(-k L) / (1 - exp(-k L)) in a length L."""
+    k = -numpy.log(1 - fog[3]) / SCALE
+    stretch = lengths(view, SCALE, 0)[:, :, 0]
+    seen, total, clear, at = 0, 0, 1, HIGH
+    for one in [*sorted(rows, key=lambda r: -r[2]), None]:
+        until = min(HIGH, max(0, one[2])) if one is not None else 0
+        length = (at - until) * stretch
+        alpha = 1 - numpy.exp(-k * length)
+        inside = 1 / k - length * numpy.exp(-k * length) / numpy.maximum(alpha, 1e-30)
+        seen = seen + clear * alpha
+        total = total + clear * alpha * ((view["eye"][2] - at) * stretch + numpy.where(alpha > 0, inside, 0))
+        clear = clear * (1 - alpha)
+        at = until
+        if one is not None:
+            write_scene("one.ply", [one])
+            alpha = definition.draw(definition.read_ply("one.ply"), view)[:, :, 3]
+            seen = seen + clear * alpha
+            total = total + clear * alpha * (view["eye"][2] - one[2]) * stretch
+            clear = clear * (1 - alpha)
+    return total / seen
+
+
 SPLATS = [row((0.2, 0.1, 12), (1, 0, 0), 0.6, (0.5, 0.4, 0.3)),  # before the fog
           row((-0.3, 0.2, 6.1), (0, 1, 0), 0.9, (0.5, 0.6, 0.2)),  # inside it
           row((0.1, -0.4, 3.3), (0, 0, 1), 0.7, (0.9, 0.4, 0.5)),
@@ -96,6 +120,24 @@ class Mixed(program.ProgramTest):
                 wanted = expected(view, rows, WHITE)
                 for renderer in "cpu", "reference", "integral", *program.GL:
                     self.assert_picture(wanted, "a.json", *options_of(view), "--renderer", renderer)
+
+    def test_distances_are_means_over_fog_and_gaussians(self):
+        write_fog("fog", WHITE)
+        write_scene("splats.ply", SPLATS)
+        write_objects("a.json", fog_object("fog"), {"data": "splats.ply"})
+        write_objects("b.json", fog_object("fog"))
+        for view in VIEWS:
+            for path, rows in ("a.json", SPLATS), ("b.json", []):
+                wanted = expected_distances(view, rows, WHITE)
+                for renderer in "cpu", "reference", *program.GL:
+                    by = path, *options_of(view), "--renderer", renderer, *CLEAR
+                    self.works("render", *by, "--depth", "z.exr", "-o", "far.exr")
+                    drawn = program.read_exr_channels("z.exr")[1][..., 0]
+                    apart = numpy.sort(abs(drawn - wanted).ravel())
+                    self.assertLess(apart[-5], 0.02, (path, renderer, apart[-9:]))
+                    self.assertTrue((program.read_exr("far.exr") == self.picture(*by)).all(), renderer)
+        self.works("render", "a.json", "--eye=0,0,30", "--look=0,0,60", "--depth", "z.exr", "-o", "far.exr")
+        self.assertTrue(numpy.isposinf(program.read_exr_channels("z.exr")[1]).all())
 
     def test_the_order_of_objects_does_not_matter(self):
         write_fog("fog", DENSE)
@@ -158,7 +200,7 @@ class Mixed(program.ProgramTest):
         write_fog("fog", WHITE)
         write_scene("splats.ply", SPLATS)
         write_objects("a.json", fog_object("fog"), {"data": "splats.ply"})
-        for options in ("--depth", "z.exr"), ("--order", "lists"), ("--lod", "1"), ("--show", "merge"):
+        for options in ("--order", "lists"), ("--lod", "1"), ("--show", "merge"):
             self.leaves_nothing(2, "render", "a.json", "-o", "a.png", *options,
                                 says="does not apply to a picture with volumes beside other objects")
         for options in ("--error", "1"), ("--emission", "fog.trip", "--effects", "emission"):
