@@ -135,7 +135,7 @@ static double place(trip_mixture_pixel *p, const float now[4], double depth, tri
                                           : 1;
 }
 
-/* Composites the Gaussians up to the slab's end, in place of those before. */
+/* Composites the Gaussians that the slab adds. `now` has all up to its end. */
 static void put_gaussians(trip_mixture_pixel *p, const float now[4])
 {
     for (int c = 0; c < 4; c++) {

@@ -109,7 +109,7 @@ class View(program.ProgramTest):
             with open("seen.exr", "rb") as seen, open("drawn.exr", "rb") as drawn:
                 self.assertEqual(seen.read(), drawn.read())
 
-    GLOWS = ["noise.trip", "--effects=emission,cueing", "--emission=heat.trip --effects=emission",
+    GLOWS = ["noise.trip", "--effects=emission,cueing", "--emission=heat.trip",
              "--temperature=500:3000"]
 
     def test_emission_equals_render(self):
@@ -760,7 +760,7 @@ class View(program.ProgramTest):
     def test_options_that_do_not_apply_to_objects_are_refused_before_a_window_opens(self):
         self.write_objects()
         for name, option in (("mixed", "--order=lists"), ("mixed", "--lod=2"), ("mixed", "--show=merge"),
-                             ("mixed", "--error=1"), ("mixed", "--emission=heat.trip"), ("mixed", "--spacing=1,1,1"), ("mixed", "--max-ms=5"),
+                             ("mixed", "--error=1"), ("mixed", "--emission=heat.trip --effects=emission"), ("mixed", "--spacing=1,1,1"), ("mixed", "--max-ms=5"),
                              ("scenes", "--order=sheets"), ("scenes", "--tf=bone"), ("scenes", "--effects=occlusion")):
             for command in "view", "serve":
                 said = self.leaves_nothing(2, command, f"{name}.json", *option.split(), says=option.partition("=")[0],
