@@ -230,14 +230,13 @@ uint32_t trip_laz_symbol(trip_laz_decoder *d, trip_laz_model *m, uint32_t symbol
     const uint16_t *starts = m->counts + m->symbols;
     const uint32_t unit = d->width >> SYMBOL_SHIFT;
     const uint32_t place = d->value / unit;
-    uint32_t low = 0, high = symbols;
-    while (low + 1 < high) {
-        const uint32_t middle = (low + high) / 2;
-        if (starts[middle] > place)
-            high = middle;
-        else
-            low = middle;
+    uint32_t low = 0;
+    for (uint32_t left = symbols; left > 1;) {
+        const uint32_t half = left / 2;
+        low += starts[low + half] <= place ? half : 0; /* without a branch */
+        left -= half;
     }
+    const uint32_t high = low + 1;
     const uint32_t from = starts[low] * unit;
     const uint32_t to = high < symbols ? starts[high] * unit : d->width;
     d->value -= from;

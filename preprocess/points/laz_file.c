@@ -70,7 +70,7 @@ static const trip_laz_item format_items[11][4] = {
     { { TRIP_LAZ_POINT_14, 30, 0 }, { TRIP_LAZ_COLOUR_NIR_14, 8, 0 }, { TRIP_LAZ_WAVE_14, 29, 0 } },
 };
 
-/* Returns whether the items are those of the point format, with further bytes at the end. */
+/* Returns whether the items fit the point format. Further bytes may be at the end. */
 static bool items_fit(const trip_laz_items *items, unsigned format)
 {
     unsigned i = 0;

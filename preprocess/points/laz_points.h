@@ -10,7 +10,7 @@
 
 enum { TRIP_LAZ_ITEMS_MAX = 5, TRIP_LAZ_LAYERS_MAX = 10 };
 
-/* Fields that are coded together. The numbers are those of the format. */
+/* Fields that are coded together, with the numbers of the format. */
 typedef enum trip_laz_item_type {
     TRIP_LAZ_BYTES = 0,
     TRIP_LAZ_POINT_10 = 6,
@@ -44,8 +44,8 @@ void trip_laz_pointwise_begin(trip_laz_pointwise *p, const unsigned char *record
 /* Replaces the record before by the next one. */
 void trip_laz_pointwise_next(trip_laz_pointwise *p, trip_laz_decoder *d, unsigned char *record);
 
-/* Point formats 6 to 10. Fields that a cloud of points has no place for keep the values of the
- * first record: scan angle, user data, point source, near infrared, waves and further bytes. */
+/* Point formats 6 to 10. Some fields are not decoded and keep the values of the first record: scan
+ * angle, user data, point source, near infrared, waves and further bytes. */
 typedef struct trip_laz_layered trip_laz_layered;
 int trip_laz_layered_create(trip_laz_layered **out, const trip_laz_items *items, int fd,
                             const char *path);

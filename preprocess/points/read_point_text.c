@@ -20,7 +20,7 @@ enum { SAMPLED_ROWS = 1000, COLUMNS_MAX = 32, PROBED_ROWS = 50, LINE_BYTES = 409
 /* The values of a column in the first rows. */
 typedef struct seen {
     bool whole; /* all are whole */
-    bool unit;  /* they and those of the next two columns are unit vectors */
+    bool unit;  /* with the next two columns, all are unit vectors */
     double least, most;
 } seen;
 
@@ -256,8 +256,8 @@ static int guess_pts(trip_point_file *f)
     return 0;
 }
 
-/* The next three columns are normals if they have unit length, or colours if their values are those
- * of colours. A column that is left is the intensity. Others are ignored. */
+/* Three columns of unit length are normals. Three columns with values of colours are colours. The
+ * first column that is left is the intensity. Others are ignored. */
 static void guess_xyz(trip_point_file *f, const seen *s)
 {
     text *t = f->state;

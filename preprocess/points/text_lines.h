@@ -19,7 +19,7 @@ int trip_text_lines_rewind(trip_text_lines *l);
  * change the text until the next call. A line of more than 64 KiB or with a zero is a reported
  * failure. */
 int trip_text_lines_next(trip_text_lines *l, char **line);
-/* Returns the number of that line, from 1. */
+/* Returns the number of the last line, from 1. */
 long trip_text_lines_number(const trip_text_lines *l);
 
 /* Splits a line into words at blanks, commas and semicolons. Returns their number, at most
@@ -29,8 +29,8 @@ unsigned trip_text_split(char *line, char *words[TRIP_TEXT_COLUMNS_MAX]);
 /* Parses a number, also "nan" and "inf". Returns false for other words. */
 bool trip_text_number(const char *word, double *out);
 
-/* Parses the first words of a line, up to `room`. Returns the number of words, or -1 if one of
- * these is no number; *wrong is then the first such word. */
+/* Parses the first words of a line, up to `room`. Returns the number of words. Returns -1 if a word
+ * is no number, and sets *wrong to the first such word. */
 int trip_text_row(char *line, double *values, unsigned room, const char **wrong);
 
 /* Returns whether the words of a line have decimal commas: "1,5 2,25 3,0". */

@@ -1,7 +1,12 @@
-/* Reads grids of points of OpenVDB leaf by leaf. The file holds the tree first. Then come a section
- * for the attributes of all leaves, one with the sizes of the pages of each attribute, one with the
- * voxels of all leaves, and one with the pages of each attribute. A cursor follows each section.
- * Memory holds 12 bytes for each leaf of up to 512 voxels, and a page of each attribute. */
+/* Reads grids of points of OpenVDB leaf by leaf. The file holds the tree, then sections for all
+ * leaves:
+ * - the attributes of each leaf
+ * - the sizes of the pages of each attribute
+ * - the voxels of each leaf
+ * - the pages of each attribute
+ *
+ * A cursor follows each section. Memory holds 12 bytes for each leaf of up to 512 voxels, and a
+ * page of each attribute. */
 #include <cmath>
 #include <cstdio>
 #include <cstring>
