@@ -62,6 +62,19 @@ int library_fail_scene_option(const char *name)
     return trip_option_fail(option, "does not apply to Gaussian scenes");
 }
 
+int library_check_cloud_options(const triptych_brick_options *options)
+{
+    if (options->spacing[0] != 0)
+        return trip_option_fail("--spacing", "does not apply to clouds of points");
+    for (size_t i = 0; i < volume_options_table.count; i++)
+        if (i != VOLUME_AXES && trip_option_is_set(&volume_options_table.rows[i], options)) {
+            char option[64];
+            snprintf(option, sizeof option, "--%s", volume_options_table.rows[i].name);
+            return trip_option_fail(option, "does not apply to clouds of points");
+        }
+    return 0;
+}
+
 int library_check_scene_options(const triptych_brick_options *options)
 {
     if (options->spacing[0] != 0) /* the table looks at a part of a number */
@@ -72,9 +85,10 @@ int library_check_scene_options(const triptych_brick_options *options)
     return 0;
 }
 
-int library_fail_scene(const char *input)
+int library_fail_scene(const char *input, int kind)
 {
-    return trip_fail(TRIP_USAGE, "usage", input, "is a Gaussian scene; `triptych render` draws it");
+    return trip_fail(TRIP_USAGE, "usage", input, "is a %s; `triptych render` draws it",
+                     kind == 3 ? "cloud of points" : "Gaussian scene");
 }
 
 void library_hush(triptych *t, bool quiet)

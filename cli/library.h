@@ -23,8 +23,11 @@ int library_check_heat(triptych *t, const char *heat, const triptych_resources *
 int library_fail_scene_option(const char *name);
 /* Fails if options for reading a volume were given for a Gaussian scene. */
 int library_check_scene_options(const triptych_brick_options *options);
-/* Fails: a command that needs volumes got a Gaussian scene. */
-int library_fail_scene(const char *input);
+/* Fails if options that a cloud of points does not have were given for one. */
+int library_check_cloud_options(const triptych_brick_options *options);
+/* Fails: a command that needs volumes got a scene. `kind` is the result of triptych_is_gaussians().
+ */
+int library_fail_scene(const char *input, int kind);
 
 void library_hush(triptych *t, bool quiet);
 /* Sets the transfer function without printing warnings. Reports failures. */

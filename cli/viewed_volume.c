@@ -66,8 +66,9 @@ static int check_volume(const viewed_volume *s, triptych *t, const char *volume)
 int viewed_volume_check(const viewed_volume *s, triptych *t, const char *input,
                         const triptych_resources *resources)
 {
-    if (triptych_is_gaussians(t, input))
-        return library_fail_scene(input);
+    const int scene = triptych_is_gaussians(t, input);
+    if (scene)
+        return library_fail_scene(input, scene);
     if (cached_volume_wanted(input))
         return check_volume(s, t, input);
     int status = triptych_open(t, input, resources);

@@ -50,6 +50,7 @@ int triptych_get_scene(triptych *t, triptych_scene *out)
         .antialiased = h->flags & TRIP_GAUSSIAN_ANTIALIASED,
         .flat = (h->flags & TRIP_GAUSSIAN_FLAT) != 0,
         .y_down = (h->flags & TRIP_GAUSSIAN_Y_DOWN) != 0,
+        .z_up = (h->flags & TRIP_GAUSSIAN_Z_UP) != 0,
         .bytes = t->scene->bytes,
         .notes = t->scene->text,
     };
@@ -70,6 +71,10 @@ int triptych_is_scene(const triptych *t)
 
 /* ---- views ---- */
 
+/* A cloud has no strays if its bounds exceed the typical bounds by at most this factor. The view
+ * then fits the whole cloud. */
+#define CLOUD_EXTENT 2
+
 trip_view_object trip_context_scene_object(const triptych *t)
 {
     const trip_file_gaussian_header *h = &t->scene->header;
@@ -77,12 +82,19 @@ trip_view_object trip_context_scene_object(const triptych *t)
     const bool y_down = h->flags & TRIP_GAUSSIAN_Y_DOWN;
     o.up = y_down ? trip_v3(0, -1, 0) : trip_v3(0, 1, 0);
     o.front = y_down ? trip_v3(0, 0, -1) : trip_v3(0, 0, 1);
-    bool point = true;
-    for (int a = 0; a < 3; a++)
-        point &= h->typical_lo[a] >= h->typical_hi[a];
+    if (h->flags & TRIP_GAUSSIAN_Z_UP) {
+        o.up = trip_v3(0, 0, 1);
+        o.front = trip_v3(0, -1, 0);
+    }
+    bool whole = true, near = (h->flags & TRIP_GAUSSIAN_CLOUD) != 0;
     for (int a = 0; a < 3; a++) {
-        o.lo[a] = point ? h->reach_lo[a] : h->typical_lo[a];
-        o.hi[a] = point ? h->reach_hi[a] : h->typical_hi[a];
+        const double typical = h->typical_hi[a] - h->typical_lo[a];
+        whole &= !(typical > 0);
+        near &= h->centre_hi[a] - h->centre_lo[a] <= CLOUD_EXTENT * typical;
+    }
+    for (int a = 0; a < 3; a++) {
+        o.lo[a] = whole || near ? h->reach_lo[a] : h->typical_lo[a];
+        o.hi[a] = whole || near ? h->reach_hi[a] : h->typical_hi[a];
     }
     return o;
 }

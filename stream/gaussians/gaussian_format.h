@@ -29,7 +29,9 @@ enum trip_gaussian_flag {
     TRIP_GAUSSIAN_ANTIALIASED = 1, /* trained with opacities that make up for the blur of pixels */
     TRIP_GAUSSIAN_FLAT = 2,        /* surfels: the third deviation is 0 everywhere */
     TRIP_GAUSSIAN_Y_DOWN = 4,      /* the scene's y axis points down */
-    TRIP_GAUSSIAN_FLAGS = 7,
+    TRIP_GAUSSIAN_Z_UP = 16,       /* the scene's z axis points up; not with Y_DOWN */
+    TRIP_GAUSSIAN_CLOUD = 32,      /* surfels of a cloud of points */
+    TRIP_GAUSSIAN_FLAGS = 55,
 };
 
 typedef struct trip_file_gaussian_header {

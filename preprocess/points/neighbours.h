@@ -1,0 +1,52 @@
+/* The nearest neighbours of a position, found in trees of positions. nanoflann holds the trees. A
+ * tree is read-only once it is made, so threads may share it. */
+#ifndef TRIP_NEIGHBOURS_H
+#define TRIP_NEIGHBOURS_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+enum { TRIP_NEIGHBOURS_MIN = 3, TRIP_NEIGHBOURS_MAX = 64 };
+
+typedef struct trip_neighbour {
+    double distance2;
+    double position[3];
+} trip_neighbour;
+
+/* The distinct positions nearest to a position, which does not count itself. They stand by
+ * distance. Equal distances stand by x, y and z, so the order of the search does not matter. */
+typedef struct trip_neighbours {
+    double position[3];
+    unsigned wanted, count;
+    trip_neighbour nearest[TRIP_NEIGHBOURS_MAX];
+} trip_neighbours;
+
+/* Returns the squared distance beyond which no position is wanted. */
+static inline double trip_neighbours_reach2(const trip_neighbours *n)
+{
+    return n->count < n->wanted ? __builtin_inf() : n->nearest[n->count - 1].distance2;
+}
+
+void trip_neighbours_add(trip_neighbours *n, double distance2, const double position[3]);
+
+typedef struct trip_neighbour_tree trip_neighbour_tree;
+
+/* Makes a tree of positions, which must outlive it. Returns NULL without memory. */
+trip_neighbour_tree *trip_neighbour_tree_make(const double (*positions)[3], size_t count);
+void trip_neighbour_tree_free(trip_neighbour_tree *t); /* NULL is allowed */
+/* Returns the greatest number of bytes of a tree. */
+size_t trip_neighbour_tree_bytes(size_t count);
+
+/* Adds the nearest positions of a tree. */
+void trip_neighbour_tree_search(const trip_neighbour_tree *t, trip_neighbours *n);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif
