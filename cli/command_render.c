@@ -126,8 +126,11 @@ static int open_volume(drawing *d)
 static int check_input(const drawing *d)
 {
     const render_options *o = &d->o;
-    const bool is_scene = triptych_is_gaussians(d->t, o->input) != 0;
-    int status = draw_settings_check_kind(&o->settings, is_scene);
+    const int is_scene = triptych_is_gaussians(d->t, o->input);
+    /* The library checks a data set of a scene. It may hold a cloud. */
+    int status = draw_settings_check_kind(&o->settings, !is_scene       ? DRAW_KIND_VOLUME
+                                                        : is_scene == 1 ? DRAW_KIND_SCENE
+                                                                        : DRAW_KIND_CLOUD);
     if (!status && is_scene && o->more_count)
         status = trip_option_fail(o->input, "is a Gaussian scene; give one scene at a time");
     if (!status && is_scene && o->quality.error > 0)

@@ -127,8 +127,9 @@ int draw_settings_check_ranges(const draw_settings *s);
 /* Checks every range and rule, as triptych_check_settings() does. With `idle_too`, also refuses
  * settings that only have no effect. */
 int draw_settings_check(const draw_settings *s, triptych_renderer *renderer, bool idle_too);
-/* Checks that all settings apply to the open data: a Gaussian scene or a volume. */
-int draw_settings_check_kind(const draw_settings *s, bool is_scene);
+typedef enum draw_kind { DRAW_KIND_VOLUME, DRAW_KIND_SCENE, DRAW_KIND_CLOUD } draw_kind;
+/* Checks that all settings apply to the kind of the open data. */
+int draw_settings_check_kind(const draw_settings *s, draw_kind kind);
 /* Unsets all settings that the other settings or the renderer exclude. */
 void draw_settings_drop_excluded(draw_settings *s, triptych_renderer renderer);
 /* Returns the name of a given setting that only splats have, or NULL. */

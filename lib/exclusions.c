@@ -311,15 +311,20 @@ int draw_settings_check(const draw_settings *s, triptych_renderer *renderer, boo
     return broken ? fail_rule(broken, given_rows(s)) : 0;
 }
 
-int draw_settings_check_kind(const draw_settings *s, bool is_scene)
+int draw_settings_check_kind(const draw_settings *s, draw_kind kind)
 {
     static const uint64_t of_scenes = ROW(ORDER) | ROW(HARMONICS);
     static const uint64_t of_both = ROW(BACKGROUND) | ROW(CLIP_BOX) | ROW(CLIP_PLANE) |
                                     ROW(EARLY_TERMINATION) | ROW(FOOTPRINT) | ROW(SAMPLES) |
                                     ROW(DEPTH) | ROW(NORMALISE) | ROW(METHOD) | ROW(H);
+    static const uint64_t of_clouds = ROW(LIGHT) | ROW(NO_SHADING);
+    const uint64_t of_kind_too = kind == DRAW_KIND_CLOUD ? of_clouds : 0;
+    const bool is_volume = kind == DRAW_KIND_VOLUME;
     const struct rule of_kind = {
-        .given = is_scene ? ~(of_scenes | of_both) : of_scenes,
-        .why = is_scene ? "does not apply to Gaussian scenes" : "applies to Gaussian scenes only",
+        .given = is_volume ? of_scenes : ~(of_scenes | of_both | of_kind_too),
+        .why = is_volume                 ? "applies to Gaussian scenes only"
+               : kind == DRAW_KIND_CLOUD ? "does not apply to clouds of points"
+                                         : "does not apply to Gaussian scenes",
     };
     return of_kind.given & given_rows(s) ? fail_rule(&of_kind, given_rows(s)) : 0;
 }

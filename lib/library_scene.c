@@ -11,6 +11,7 @@
 #include "library_context.h"
 #include "normalise.h"
 #include "report.h"
+#include "shade.h"
 
 int trip_context_open_scene(triptych *t, const char *path, uint64_t memory_bytes)
 {
@@ -112,7 +113,9 @@ static int check(const triptych *t, bool *reference)
         return trip_option_fail("--kernel", "fixed does not apply to Gaussian scenes");
     if (t->given.all.method == TRIPTYCH_METHOD_IMAGE)
         return trip_option_fail("--method", "image does not apply to Gaussian scenes");
-    return draw_settings_check_kind(&t->given, true);
+    return draw_settings_check_kind(&t->given, t->scene->header.flags & TRIP_GAUSSIAN_CLOUD
+                                                   ? DRAW_KIND_CLOUD
+                                                   : DRAW_KIND_SCENE);
 }
 
 static int make_camera(triptych *t, int side)
@@ -148,6 +151,21 @@ static trip_gaussian_settings settings_of(const triptych *t)
         out.degree = (int)t->scene->header.degree;
     memcpy(out.background, t->settings.background, sizeof out.background);
     return out;
+}
+
+/* Sets the light on surfels. Colours of a camera have a light of their own, and get another only if
+ * one is given. */
+static bool choose_light(triptych *t)
+{
+    const uint32_t flags = t->scene->header.flags;
+    const triptych_light *given = &t->given.light;
+    trip_settings *s = &t->drawn_settings;
+    if (given->kind == TRIPTYCH_LIGHT_VIEW)
+        s->light_direction = trip_normalize(trip_camera_direction(
+            &t->camera, given->toward[0], given->toward[1], given->toward[2]));
+    s->headlight &= given->kind != TRIPTYCH_LIGHT_VIEW;
+    return flags & TRIP_GAUSSIAN_CLOUD && s->shading &&
+           (flags & TRIP_GAUSSIAN_SHADED || given->kind != TRIPTYCH_LIGHT_DEFAULT);
 }
 
 /* Takes the picture of several rays per pixel. */
@@ -187,11 +205,19 @@ int trip_context_begin_scene(triptych *t)
     t->drawn_settings.classify = TRIP_CLASSIFY_PRE; /* h of splats */
     t->drawn_settings.samples = side;
     t->begun_ms = trip_now_ms();
+    const bool lit = choose_light(t);
+    const trip_affine identity = trip_affine_identity();
+    status = lit ? trip_light_check(&t->drawn_settings, &identity) : 0;
+    if (status) {
+        trip_context_end_scene(t);
+        return status;
+    }
     const trip_gaussian_frame_params params = {
         .set = t->scene,
         .camera = &t->camera,
         .settings = settings_of(t),
         .by_lists = t->given.scene.order == TRIPTYCH_ORDER_LISTS ? &t->drawn_settings : NULL,
+        .light = lit ? &t->drawn_settings : NULL,
         .reference = reference,
         .budget = t->session.budget,
         .runner = trip_renderer_runner(t->renderer),

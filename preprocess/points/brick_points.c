@@ -424,18 +424,19 @@ static int brick_surfels(bricker *b, trip_brick_gaussians_result *result)
     const trip_brick_points_params *p = b->p;
     release_sample(b);
     b->passed += b->records;
-    return trip_brick_gaussians(&(trip_brick_gaussians_params){ .path = p->path,
-                                                                .replace = p->replace,
-                                                                .source = give_surfels,
-                                                                .source_user = b,
-                                                                .source_name = p->file_name,
-                                                                .flags = p->flags |
-                                                                         TRIP_GAUSSIAN_FLAT |
-                                                                         TRIP_GAUSSIAN_CLOUD,
-                                                                .text = p->text,
-                                                                .progress = tell,
-                                                                .progress_user = b },
-                                b->budget, result);
+    return trip_brick_gaussians(
+        &(trip_brick_gaussians_params){
+            .path = p->path,
+            .replace = p->replace,
+            .source = give_surfels,
+            .source_user = b,
+            .source_name = p->file_name,
+            .flags = p->flags | TRIP_GAUSSIAN_FLAT | TRIP_GAUSSIAN_CLOUD |
+                     (p->colouring == TRIP_POINT_BY_RGB ? 0 : TRIP_GAUSSIAN_SHADED),
+            .text = p->text,
+            .progress = tell,
+            .progress_user = b },
+        b->budget, result);
 }
 
 static int run(bricker *b, trip_brick_gaussians_result *result)

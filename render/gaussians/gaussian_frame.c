@@ -10,6 +10,7 @@
 #include "normalise.h"
 #include "renderer.h"
 #include "report.h"
+#include "surfel_light.h"
 #include "weight.h"
 
 enum { BATCH = 1024, LAYERS_MAX = 3, WAYS = 2 };
@@ -32,6 +33,7 @@ typedef struct layer {
 struct trip_gaussian_frame {
     trip_gaussian_frame_params params;
     trip_settings weights; /* of the order by lists */
+    trip_settings light;   /* on surfels, if `shading` */
     int axis_of_view;
     layer layers[LAYERS_MAX];
     unsigned layer_count, drawn; /* layers; those that are complete */
@@ -236,10 +238,13 @@ static void close_streams(trip_gaussian_frame *f)
     f->source_count = 0;
 }
 
-static int fill(source *s)
+static int fill(const trip_gaussian_frame *f, source *s)
 {
     s->at = s->count = 0;
-    return trip_gaussian_stream_next(s->stream, s->batch, s->keys, BATCH, &s->count);
+    const int status = trip_gaussian_stream_next(s->stream, s->batch, s->keys, BATCH, &s->count);
+    if (!status && f->light.shading)
+        trip_surfel_light(&f->light, f->params.camera, s->batch, s->count);
+    return status;
 }
 
 static bool has_any(const source *s)
@@ -252,9 +257,9 @@ static int take_batch(trip_gaussian_frame *f, const trip_gaussian **batch, size_
 {
     const double begun = trip_now_ms();
     source *a = &f->sources[0], *b = &f->sources[1];
-    int status = has_any(a) ? 0 : fill(a);
+    int status = has_any(a) ? 0 : fill(f, a);
     if (!status && f->source_count > 1 && !has_any(b))
-        status = fill(b);
+        status = fill(f, b);
     if (status || f->source_count == 1) {
         *batch = a->batch;
         *count = status ? 0 : a->count;
@@ -284,6 +289,8 @@ int trip_gaussian_frame_begin(trip_gaussian_frame **out, const trip_gaussian_fra
     f->axis_of_view = trip_weight_axis_of_view(params->camera);
     if (params->by_lists)
         f->weights = *params->by_lists;
+    if (params->light)
+        f->light = *params->light;
     int status = take_memory(f) ? 0
                                 : trip_fail(TRIP_ERROR, "render", "memory",
                                             "the layers do not fit; raise --memory or draw a "

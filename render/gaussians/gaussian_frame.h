@@ -24,6 +24,8 @@ typedef struct trip_gaussian_frame_params {
     trip_gaussian_settings settings;
     /* For the order by lists: its method and h. NULL: by depth. */
     const trip_settings *by_lists;
+    /* The light on surfels; NULL: none. Index space of the camera is world space. */
+    const trip_settings *light;
     bool reference; /* draws in double precision, without threads */
     trip_budget *budget;
     trip_task_runner runner;

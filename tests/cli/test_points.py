@@ -153,7 +153,7 @@ class Points(program.ProgramTest):
 
     def middle(self, path, *options):
         """Returns the colours of three points along x, which are 0.6 apart."""
-        picture = self.front(path, "--radius", 0.1, *options)
+        picture = self.front(path, "--radius", 0.1, "--no-shading", *options)
         found = [picture[32, int(32.5 + x * 65 / 2)] for x in (-.6, 0, .6)]
         return numpy.array([c[:3] / c[3] for c in found])
 
@@ -175,7 +175,7 @@ class Points(program.ProgramTest):
                     blue=[0] * 3)
         done = self.works("brick", "h.ply", "-o", "h.trip", "--radius", "0.1")
         self.assertIn("is drawn by its heights", done.stderr)
-        picture = self.picture("h.trip", *FRAME, "--eye", "0,0,5", "--up", "0,1,0")[32, 32]
+        picture = self.front("h.trip", "--no-shading")[32, 32]
         numpy.testing.assert_allclose(picture[:3] / picture[3], viridis[1], atol=0.02)
 
     def test_the_cache_keeps_a_data_set_for_each_choice(self):
@@ -188,6 +188,49 @@ class Points(program.ProgramTest):
             after = json.loads(self.works("cache", "list", "--json").stdout)
             self.assertEqual(len(str(after)) > len(str(before)), True, options)
             numpy.testing.assert_array_equal(one, two)
+
+    # ---- light ----
+
+    def lit(self, turn, *options):
+        """Returns the red of a grey point whose normal is turned from the view, over its alpha."""
+        write_cloud("lit.ply", [[0, 0, 0]], radius=[1], nx=[math.sin(turn)], ny=[0],
+                    nz=[math.cos(turn)], red=[102], green=[102], blue=[102], intensity=[5])
+        picture = self.front("lit.ply", *options)[32, 32]
+        return picture[0] / picture[3]
+
+    def test_light_shades_points_by_their_normals(self):
+        """The model of shade.h: ambient 0.3, diffuse 0.7, and 0.2 times the highlight's power 24."""
+        for degrees in 0, 30, 60, 80:
+            turn = math.radians(degrees)
+            near = math.cos(turn)
+            facing = min(1, 4 * near * near)
+            head = 0.4 * (0.3 + 0.7 * near) + 0.2 * facing * near ** 24
+            side = math.radians(degrees - 45)  # from the upper right of the z axis
+            half = math.radians(degrees - 22.5)
+            facing = min(1, max(0, 4 * math.cos(side) * near))
+            aside = (0.4 * (0.3 + 0.7 * abs(math.cos(side)))
+                     + 0.2 * facing * abs(math.cos(half)) ** 24)
+            for options, expected in ((), 0.4), (("--light", "head"), head), \
+                    (("--light", "head", "--order", "lists"), head), \
+                    (("--light", "head", "--renderer", "reference"), head), \
+                    (("--light", "world:1,0,1"), aside), (("--light", "point:900,0,900"), aside), \
+                    (("--no-shading",), 0.4), \
+                    (("--color", "intensity"), None), (("--color", "intensity", "--no-shading"), 0.5):
+                if expected is None:  # half grey, with a light of its own
+                    expected = 0.5 * (0.3 + 0.7 * near) + head - 0.4 * (0.3 + 0.7 * near)
+                self.assertAlmostEqual(self.lit(turn, *options), expected, delta=0.006,
+                                       msg=(degrees, options))
+
+    def test_light_is_refused_for_scenes(self):
+        scene = os.path.join(program.DATASETS, "train-1000.ply")
+        self.works("brick", scene, "-o", "scene.trip", "-q")
+        for name in scene, "scene.trip":
+            for options in ("--light", "head"), ("--no-shading",):
+                self.leaves_nothing(2, "render", name, "-o", "no.png", *options,
+                                    says="does not apply to Gaussian scenes")
+        write_cloud("a.ply", grid(4))
+        self.leaves_nothing(2, "render", "a.ply", "-o", "no.png", "--effects", "shadows",
+                            says="does not apply to clouds of points")
 
     # ---- up ----
 
