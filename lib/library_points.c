@@ -1,6 +1,7 @@
 /* Describes and bricks clouds of points for triptych_brick.h. */
 #include "triptych_brick.h"
 
+#include <ctype.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -141,17 +142,35 @@ static const char *usual_up(const trip_point_info *info)
     return "y";
 }
 
+/* Sets the axis that a comment of the file names. */
+static void find_stated_up(const trip_point_info *info, char up[3])
+{
+    static const char name[] = "Vertical Axis:";
+    const char *at = strcasestr(info->comments, name);
+    if (!at)
+        return;
+    at += strlen(name);
+    while (*at == ' ')
+        at++;
+    const bool minus = *at == '-';
+    const int axis = tolower((unsigned char)at[minus]);
+    if (axis >= 'x' && axis <= 'z')
+        snprintf(up, 3, "%s%c", minus ? "-" : "", axis);
+}
+
 /* Sets the axis that points up from --axes: the one with the letter S, or I with a minus. */
 static int find_up(const trip_point_info *info, const char *path, const char *axes, char up[3])
 {
     snprintf(up, 3, "%s", usual_up(info));
+    if (!axes)
+        find_stated_up(info, up);
     for (int a = 0; axes && axes[a]; a++)
         if (axes[a] == 'S' || axes[a] == 'I')
             snprintf(up, 3, "%s%c", axes[a] == 'I' ? "-" : "", 'x' + a);
     return !strcmp(up, "y") || !strcmp(up, "-y") || !strcmp(up, "z")
                ? 0
                : trip_fail(TRIP_USAGE, "brick", path,
-                           "--axes must let y or z point up, or y down, for a cloud of points");
+                           "is a cloud of points; y or z must point up, or y down: give --axes");
 }
 
 static void show_rows(void *user, uint64_t passed, uint64_t all)

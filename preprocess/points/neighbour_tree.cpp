@@ -1,6 +1,5 @@
 #include "neighbours.h"
 
-#include <cmath>
 #include <limits>
 #include <nanoflann.hpp>
 #include <new>
@@ -37,7 +36,8 @@ struct results {
 
     double worstDist() const
     {
-        return std::nextafter(trip_neighbours_reach2(to), std::numeric_limits<double>::infinity());
+        const double reach2 = trip_neighbours_reach2(to);
+        return reach2 + reach2 * std::numeric_limits<double>::epsilon();
     }
     bool addPoint(double distance2, size_t i)
     {

@@ -32,7 +32,42 @@ static inline double trip_neighbours_reach2(const trip_neighbours *n)
     return n->count < n->wanted ? __builtin_inf() : n->nearest[n->count - 1].distance2;
 }
 
-void trip_neighbours_add(trip_neighbours *n, double distance2, const double position[3]);
+/* Returns below 0, 0 or above 0. */
+static inline int trip_neighbour_compare(const trip_neighbour *a, double distance2,
+                                         const double position[3])
+{
+    if (a->distance2 != distance2)
+        return a->distance2 < distance2 ? -1 : 1;
+    for (int i = 0; i < 3; i++)
+        if (a->position[i] != position[i])
+            return a->position[i] < position[i] ? -1 : 1;
+    return 0;
+}
+
+static inline void trip_neighbours_add(trip_neighbours *n, double distance2,
+                                       const double position[3])
+{
+    unsigned at = n->count;
+    if (!(distance2 > 0))
+        return;
+    while (at > 0) {
+        const int order = trip_neighbour_compare(&n->nearest[at - 1], distance2, position);
+        if (order == 0)
+            return;
+        if (order < 0)
+            break;
+        at--;
+    }
+    if (at == n->wanted)
+        return;
+    const unsigned kept = n->count < n->wanted ? n->count : n->wanted - 1;
+    for (unsigned i = kept; i > at; i--)
+        n->nearest[i] = n->nearest[i - 1];
+    n->nearest[at].distance2 = distance2;
+    for (int i = 0; i < 3; i++)
+        n->nearest[at].position[i] = position[i];
+    n->count = kept + 1;
+}
 
 typedef struct trip_neighbour_tree trip_neighbour_tree;
 

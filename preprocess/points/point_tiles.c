@@ -26,6 +26,22 @@ typedef struct slot {
     trip_neighbour_tree *tree;
 } slot;
 
+enum { NEAR_MAX = 64 };
+
+typedef struct near_tile {
+    box box;
+    uint64_t tile;
+} near_tile;
+
+/* The tiles near a tile: all whose bounds are at most a distance away. */
+typedef struct near_tiles {
+    bool known;
+    uint64_t of;
+    double distance2; /* below 0: too many tiles are near */
+    unsigned count;
+    near_tile tiles[NEAR_MAX];
+} near_tiles;
+
 struct trip_point_tiles {
     trip_point_tiles_params params;
     trip_budget *budget;
@@ -49,6 +65,7 @@ struct trip_point_tiles {
     uint32_t *slot_of; /* 1 + the slot of a tile; 0: none */
     uint64_t searches;
     trip_point_row *rooms; /* for the rows of a tile, one for each thread */
+    near_tiles *near;      /* one for each thread */
 };
 
 static int fail_memory(const trip_point_tiles *t)
@@ -218,7 +235,8 @@ static int take_slots(trip_point_tiles *t, unsigned count)
     t->slots = calloc(count, sizeof *t->slots);
     t->slot_of = trip_budget_take(t->budget, t->tile_count * sizeof *t->slot_of);
     t->rooms = trip_budget_take(t->budget, t->threads * room_bytes);
-    if (!t->slots || !t->slot_of || !t->rooms)
+    t->near = calloc(t->threads, sizeof *t->near);
+    if (!t->slots || !t->slot_of || !t->rooms || !t->near)
         return fail_memory(t);
     for (; t->slot_count < count; t->slot_count++) {
         slot *s = &t->slots[t->slot_count];
@@ -336,8 +354,20 @@ static double distance2(const double lo[3], const double hi[3], const double p[3
 {
     double sum = 0;
     for (int a = 0; a < 3; a++) {
-        const double d = fmax(0, fmax(lo[a] - p[a], p[a] - hi[a]));
-        sum += d * d;
+        const double below = lo[a] - p[a], above = p[a] - hi[a];
+        const double d = below > above ? below : above;
+        sum += d > 0 ? d * d : 0;
+    }
+    return sum;
+}
+
+static double apart2(const double lo[3], const double hi[3], const trip_point_tile *tile)
+{
+    double sum = 0;
+    for (int a = 0; a < 3; a++) {
+        const double below = lo[a] - tile->hi[a], above = tile->lo[a] - hi[a];
+        const double d = below > above ? below : above;
+        sum += d > 0 ? d * d : 0;
     }
     return sum;
 }
@@ -383,10 +413,64 @@ static int descend(trip_point_tiles *t, unsigned thread, unsigned level, uint64_
     return status;
 }
 
+/* Lists the tiles below a box that are near. Returns false if there are too many. */
+static bool list_near(const trip_point_tiles *t, unsigned level, uint64_t at, near_tiles *near)
+{
+    const trip_point_tile *of = &t->tiles[near->of];
+    const uint64_t end = level ? t->level_count[level - 1] : t->tile_count;
+    for (uint64_t i = at * FAN; i < (at + 1) * FAN && i < end; i++) {
+        const box *b = level ? &t->boxes[t->level_at[level - 1] + i] : NULL;
+        const trip_point_tile *tile = level ? NULL : &t->tiles[i];
+        if (apart2(b ? b->lo : tile->lo, b ? b->hi : tile->hi, of) > near->distance2)
+            continue;
+        if (level > 0) {
+            if (!list_near(t, level - 1, i, near))
+                return false;
+        } else if (i != near->of) {
+            if (near->count == NEAR_MAX)
+                return false;
+            near_tile *to = &near->tiles[near->count++];
+            to->tile = i;
+            widen(&to->box, tile->lo, tile->hi, true);
+        }
+    }
+    return true;
+}
+
+/* Lists the tiles within a quarter of the tile's extent, or within less if there are too many. */
+static const near_tiles *find_near(const trip_point_tiles *t, unsigned thread, uint64_t tile)
+{
+    enum { TRIES = 8 };
+    near_tiles *near = &t->near[thread];
+    const trip_point_tile *of = &t->tiles[tile];
+    double extent2 = 0;
+    if (near->known && near->of == tile)
+        return near;
+    for (int a = 0; a < 3; a++)
+        extent2 += (of->hi[a] - of->lo[a]) * (of->hi[a] - of->lo[a]);
+    near->known = true;
+    near->of = tile;
+    near->distance2 = extent2 / 16;
+    for (int i = 0; i < TRIES; i++, near->distance2 /= 4) {
+        near->count = 0;
+        if (list_near(t, t->levels - 1, 0, near))
+            return near;
+    }
+    near->distance2 = -1;
+    return near;
+}
+
 int trip_point_tiles_search(trip_point_tiles *t, unsigned thread, uint64_t tile, trip_neighbours *n)
 {
-    const int status = search_tile(t, thread, tile, n);
-    return status < 0 ? status : descend(t, thread, t->levels - 1, 0, tile, n);
+    const near_tiles *near = find_near(t, thread, tile);
+    int status = search_tile(t, thread, tile, n);
+    if (status < 0 || !(trip_neighbours_reach2(n) <= near->distance2))
+        return status < 0 ? status : descend(t, thread, t->levels - 1, 0, tile, n);
+    for (unsigned i = 0; i < near->count && status == 0; i++)
+        if (distance2(near->tiles[i].box.lo, near->tiles[i].box.hi, n->position) <=
+            trip_neighbours_reach2(n))
+            status = search_tile(t, thread, near->tiles[i].tile, n);
+    return status;
 }
 
 void trip_point_tiles_free(trip_point_tiles *t)
@@ -399,6 +483,7 @@ void trip_point_tiles_free(trip_point_tiles *t)
         trip_budget_discharge(t->budget, slot_bytes() - positions_bytes());
     }
     free(t->slots);
+    free(t->near);
     if (t->slot_of)
         trip_budget_release(t->budget, t->slot_of, t->tile_count * sizeof *t->slot_of);
     if (t->rooms)

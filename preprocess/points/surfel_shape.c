@@ -7,6 +7,9 @@
 
 enum { SWEEPS = 12 };
 
+/* A matrix is diagonal if the other values are at most this part of its diagonal. */
+#define DIAGONAL 1e-14
+
 /* Neighbours are on a line if the second variance is at most this part of the greatest. */
 #define LINE 1e-8
 
@@ -18,7 +21,8 @@ static void diagonalise(double m[3][3], double axes[3][3])
         for (int j = 0; j < 3; j++)
             axes[i][j] = i == j;
     for (int sweep = 0; sweep < SWEEPS; sweep++) {
-        if (m[0][1] == 0 && m[0][2] == 0 && m[1][2] == 0)
+        const double beside = fabs(m[0][1]) + fabs(m[0][2]) + fabs(m[1][2]);
+        if (beside <= DIAGONAL * (fabs(m[0][0]) + fabs(m[1][1]) + fabs(m[2][2])))
             return;
         for (int p = 0; p < 2; p++)
             for (int q = p + 1; q < 3; q++) {

@@ -221,6 +221,19 @@ class Points(program.ProgramTest):
                 self.assertAlmostEqual(self.lit(turn, *options), expected, delta=0.006,
                                        msg=(degrees, options))
 
+    def test_normals_from_neighbours_light_a_scan_as_its_own_normals_do(self):
+        """The normals of the file come from the surface that its program fused."""
+        path = os.path.join(program.DATASETS, "lamp.ply")
+        data = pathlib.Path(path).read_bytes()
+        at = data.index(b"end_header\n") + 11
+        rows = numpy.frombuffer(data[at:], [("p", "<f4", 3), ("n", "<f4", 3), ("c", "u1", 3)])
+        red, green, blue = rows["c"].T
+        write_cloud("bare.ply", rows["p"], ["Vertical Axis: -y"], red=red, green=green, blue=blue)
+        one, two = (self.picture(name, "--size", "200x200", "--light", "head")
+                    for name in (path, "bare.ply"))
+        self.assertGreater((one[:, :, 3] > 0.9).mean(), 0.1)
+        self.assertLess(255 * numpy.abs(one - two).mean(), 1.5)
+
     def test_light_is_refused_for_scenes(self):
         scene = os.path.join(program.DATASETS, "train-1000.ply")
         self.works("brick", scene, "-o", "scene.trip", "-q")
@@ -238,8 +251,10 @@ class Points(program.ProgramTest):
         points = [[0, 0, 0], [1, 0, 0], [0, 2, 0], [0, 0, 3]]
         write_las("a.las", points, [2] * 4)
         write_cloud("a.ply", points)
+        write_cloud("c.ply", points, ["Vertical Axis: -y"])
         for name, options, up in (("a.las", (), "z"), ("a.ply", (), "y"), ("a.ply", ("--axes", "RAS"), "z"),
-                                  ("a.ply", ("--axes", "RIP"), "-y"), ("a.las", ("--axes", "RSA"), "y")):
+                                  ("a.ply", ("--axes", "RIP"), "-y"), ("a.las", ("--axes", "RSA"), "y"),
+                                  ("c.ply", (), "-y"), ("c.ply", ("--axes", "RAS"), "z")):
             shutil.rmtree("up.trip", ignore_errors=True)
             self.works("brick", name, "-o", "up.trip", "-q", *options)
             done = json.loads(self.works("info", "up.trip", "--json").stdout)
