@@ -13,6 +13,7 @@
 #include "triptych_brick.h"
 #include "accuracy_report.h"
 #include "machine.h"
+#include "scene_report.h"
 
 static int print_settings(void)
 {
@@ -58,17 +59,27 @@ static int measure(const accuracy_options *o, accuracy_folder *folder, const cha
     return status;
 }
 
-static int check_data(const accuracy_options *o)
+static int report_scene(const accuracy_options *o, accuracy_folder *folder, const char *command)
+{
+    int status = accuracy_scene_report(o, folder->temporary, command);
+    return status ? status : accuracy_folder_finish(folder);
+}
+
+/* Checks the data. Sets *scene to whether it is the data set of a Gaussian scene. */
+static int check_data(const accuracy_options *o, bool *scene)
 {
     triptych *t = NULL;
     int status =
         triptych_create(&t) ? trip_fail(TRIP_ERROR, "accuracy", "library", "out of memory") : 0;
-    for (int i = 0; i < o->data_count && !status; i++)
-        if (triptych_is_gaussians(t, o->data[i]))
+    for (int i = 0; i < o->data_count && !status; i++) {
+        const int kind = triptych_is_gaussians(t, o->data[i]);
+        *scene |= kind == 2;
+        if (kind == 1)
             status = trip_fail(TRIP_USAGE, "usage", o->data[i],
-                               "is a Gaussian scene; `triptych render` draws it");
+                               "is a Gaussian scene; `triptych brick` makes a data set of it");
+    }
     triptych_destroy(t);
-    return status;
+    return status || !*scene ? status : accuracy_scene_check(o);
 }
 
 int trip_accuracy(int argc, char **argv)
@@ -76,13 +87,14 @@ int trip_accuracy(int argc, char **argv)
     accuracy_options o;
     accuracy_folder folder = { 0 };
     char *command = measure_command_line(argc, argv), *output = NULL;
+    bool scene = false;
     int status = accuracy_options_parse(&o, argc, argv);
     if (!status && o.list) {
         free(command);
         return print_settings();
     }
     if (!status)
-        status = check_data(&o);
+        status = check_data(&o, &scene);
     if (!status && !o.output)
         o.output = output = accuracy_report_path(o.data[0]);
     if (!status && (!command || !o.output))
@@ -90,7 +102,7 @@ int trip_accuracy(int argc, char **argv)
     if (!status)
         status = accuracy_folder_begin(&folder, o.output, o.force);
     if (!status)
-        status = measure(&o, &folder, command);
+        status = scene ? report_scene(&o, &folder, command) : measure(&o, &folder, command);
     accuracy_folder_abandon(&folder);
     free(output);
     free(command);

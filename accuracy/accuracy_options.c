@@ -141,6 +141,9 @@ static int check(void *user)
         return trip_option_fail("--compare", "none excludes other programs");
     for (int i = 0; i < p->also_count; i++)
         o->data[o->data_count++] = p->also[i];
+    o->tolerance_given = o->tolerance > 0;
+    if (!o->tolerance_given)
+        o->tolerance = 4e-3;
     o->shading = !o->no_shading;
     o->usual = !o->settings;
     if (o->usual)
@@ -152,12 +155,9 @@ static int check(void *user)
 
 int accuracy_options_parse(accuracy_options *o, int argc, char **argv)
 {
-    *o = (accuracy_options){ .width = 256,
-                             .height = 256,
-                             .views = 4,
-                             .repeat = 3,
-                             .tolerance = 4e-3,
-                             .budget_seconds = 1e9 };
+    *o = (accuracy_options){
+        .width = 256, .height = 256, .views = 4, .repeat = 3, .budget_seconds = 1e9
+    };
     parse p = { .o = o };
     option_set sets[] = { { .table = &parse_table, .base = &p },
                           { .table = &accuracy_table, .base = o } };

@@ -23,6 +23,7 @@ typedef struct accuracy_options {
     bool usual;           /* --settings was not given */
     int width, height, views, repeat;
     double tolerance, budget_seconds;
+    bool tolerance_given;
     bool shading;
     int no_shading, steps, force, list, pictures;
     unsigned threads; /* 0 selects one per processor */

@@ -90,16 +90,18 @@ void accuracy_report_free(accuracy_report *r)
     *r = (accuracy_report){ 0 };
 }
 
-static void write_json(FILE *f, const accuracy_report *r)
+static void write_json(FILE *f, const void *data)
 {
+    const accuracy_report *r = data;
     char *text = trip_json_print(r->json, true);
     fputs(text ? text : "", f);
     free(text);
 }
 
 /* Writes a line for each measured setting. */
-static void write_csv(FILE *f, const accuracy_report *r)
+static void write_csv(FILE *f, const void *data)
 {
+    const accuracy_report *r = data;
 #define FIGURES(step) step ".max", step ".mean", step ".median", step ".percentile_99", step ".psnr"
     static const char *const keys[] = { "name",
                                         "data_set",
@@ -128,16 +130,20 @@ static void write_csv(FILE *f, const accuracy_report *r)
     measure_table_csv(f, cJSON_GetObjectItem(r->json, "rows"), keys, sizeof keys / sizeof *keys);
 }
 
-/* Writes a part of the report into a file. */
-static int write_part(const accuracy_report *r, const char *folder, const char *name,
-                      void (*write)(FILE *f, const accuracy_report *r))
+static void write_html(FILE *f, const void *data)
+{
+    accuracy_report_html(f, data);
+}
+
+int accuracy_write_part(const char *folder, const char *name,
+                        void (*write)(FILE *f, const void *data), const void *data)
 {
     char path[PATH_MAX + 32], *text = NULL;
     size_t bytes;
     FILE *f = open_memstream(&text, &bytes);
     snprintf(path, sizeof path, "%s/%s", folder, name);
     if (f)
-        write(f, r);
+        write(f, data);
     int status = !f || fclose(f) || !bytes ? out_of_memory()
                  : trip_interrupted()
                      ? trip_fail(TRIP_INTERRUPTED, "accuracy", folder, "interrupted")
@@ -148,10 +154,10 @@ static int write_part(const accuracy_report *r, const char *folder, const char *
 
 int accuracy_report_write(const accuracy_report *r, const char *folder)
 {
-    int status = write_part(r, folder, "accuracy.json", write_json);
+    int status = accuracy_write_part(folder, "accuracy.json", write_json, r);
     if (!status)
-        status = write_part(r, folder, "accuracy.csv", write_csv);
-    return status ? status : write_part(r, folder, "index.html", accuracy_report_html);
+        status = accuracy_write_part(folder, "accuracy.csv", write_csv, r);
+    return status ? status : accuracy_write_part(folder, "index.html", write_html, r);
 }
 
 static void write_point(FILE *f, const char *name, const double p[3])
@@ -223,9 +229,9 @@ void accuracy_print_left_out(FILE *f, const accuracy_report *r, const char *befo
 static void print_rows(FILE *f, const cJSON *rows, const char *title)
 {
     static const measure_column columns[] = {
-        { "name", "setting", 0, 0 }, { "ms", "ms", 1, 0 },
-        { "error", "error", 2, 0 },  { "total.mean", "mean", 2, 0 },
-        { "promise", "promise", 1, 0 },  { "rays.mean", "along rays", 2, 0 },
+        { "name", "setting", 0, 0 },    { "ms", "ms", 1, 0 },
+        { "error", "error", 2, 0 },     { "total.mean", "mean", 2, 0 },
+        { "promise", "promise", 1, 0 }, { "rays.mean", "along rays", 2, 0 },
     };
     if (rows && rows->child)
         measure_table_print(f, &(measure_table){ .title = title,

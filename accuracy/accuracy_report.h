@@ -54,6 +54,12 @@ void accuracy_report_print(FILE *f, const accuracy_report *r);
 void accuracy_print_left_out(FILE *f, const accuracy_report *r, const char *before,
                              void (*write)(FILE *f, const char *text));
 
+/* Writes a file of a report: `write` prints it from `data`. */
+int accuracy_write_part(const char *folder, const char *name,
+                        void (*write)(FILE *f, const void *data), const void *data);
+/* The style sheet of the page. */
+extern const char accuracy_page_style[];
+
 /* Write the options of `triptych render` for a view and for a setting, as shell words. */
 void accuracy_write_view(FILE *f, const accuracy_view *view);
 void accuracy_write_options(FILE *f, const accuracy_setting *s);

@@ -6,7 +6,7 @@
 #include "accuracy_report.h"
 #include "text.h"
 
-static const char style[] =
+const char accuracy_page_style[] =
     "body{font:15px/1.45 system-ui,sans-serif;max-width:1180px;margin:24px auto;padding:0 16px;"
     "color:#222}\n"
     "h1{font-size:24px}h2{font-size:19px;margin-top:32px}\n"
@@ -24,7 +24,8 @@ static void write_head(FILE *f, const accuracy_report *r)
     const accuracy_options *o = r->m->options;
     fputs("<!DOCTYPE html>\n<html lang=en><head><meta charset=utf-8>\n<title>Accuracy: ", f);
     measure_write_escaped(f, o->data[0]);
-    fprintf(f, "</title>\n<style>\n%s</style></head><body>\n<h1>Accuracy and time: ", style);
+    fprintf(f, "</title>\n<style>\n%s</style></head><body>\n<h1>Accuracy and time: ",
+            accuracy_page_style);
     measure_write_escaped(f, o->data[0]);
     fprintf(f,
             "</h1>\n<p>Pictures of %d x %d pixels from %d view%s, compared with the "

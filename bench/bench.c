@@ -23,14 +23,15 @@ static const struct {
     bool from_disk;     /* the frames of the scene read from disk, not from memory */
     bool makes_volumes; /* makes its own volumes if no data set is named */
     bool opens;         /* opens the data set itself */
+    bool of_scenes;     /* also measures data sets of Gaussian scenes */
 } tables[] = {
-    { .name = "orders", .run_scene = bench_orders },
+    { .name = "orders", .run_scene = bench_orders, .of_scenes = true },
     { .name = "submit", .run_scene = bench_submit },
     { .name = "stream", .run_scene = bench_stream, .from_disk = true },
     { .name = "renderers", .run = bench_renderers },
     { .name = "popping", .run_scene = bench_popping },
     { .name = "levels", .run = bench_levels, .makes_volumes = true },
-    { .name = "flight", .run = bench_flight, .opens = true },
+    { .name = "flight", .run = bench_flight, .opens = true, .of_scenes = true },
     { .name = "ewa", .run = bench_ewa },
     { .name = "variants", .run_scene = bench_variants },
 };
@@ -124,17 +125,39 @@ static int check_plot(const bench_options *o)
     return status;
 }
 
+/* Checks the options for a Gaussian scene. */
+static int check_scene(const bench_options *o, size_t table)
+{
+    if (!tables[table].of_scenes)
+        return trip_fail(TRIP_USAGE, "usage", o->input,
+                         "is a Gaussian scene; only the tables orders and flight measure it");
+    if (tables[table].opens)
+        return 0;
+    if (!o->usual || o->tf)
+        return trip_fail(TRIP_USAGE, "usage", o->input,
+                         "is a Gaussian scene; only --json, --memory, --repeat, --size and "
+                         "--threads apply");
+    if (o->renderers[0] != TRIP_RENDERER_CPU && o->renderers[0] != TRIP_RENDERER_AUTO)
+        return trip_option_fail("--renderer", "must be cpu for a Gaussian scene");
+    return 0;
+}
+
 static int measure(bench_options *o, bench_report *r)
 {
     const size_t table = table_of(o);
-    if (o->input && (trip_gaussian_set_is(o->input) || trip_gaussian_file_is(o->input)))
-        return trip_fail(TRIP_USAGE, "usage", o->input,
-                         "is a Gaussian scene; `triptych render` draws it");
+    const bool scene = o->input && trip_gaussian_set_is(o->input);
+    int status = scene ? check_scene(o, table) : 0;
+    if (o->input && !scene && trip_gaussian_file_is(o->input))
+        status = trip_fail(TRIP_USAGE, "usage", o->input,
+                           "is a Gaussian scene; `triptych brick` makes a data set of it");
+    if (status)
+        return status;
     if (!o->input && tables[table].makes_volumes)
         bench_options_choose(o, false);
     o->progress = command_line_quiet() ? NULL : measure_progress_start(o->table);
-    int status = !o->input && tables[table].makes_volumes ? tables[table].run(NULL, o, r)
-                                                          : measure_data(o, table, r);
+    status = scene && !tables[table].opens              ? bench_gaussians(o, r)
+             : !o->input && tables[table].makes_volumes ? tables[table].run(NULL, o, r)
+                                                        : measure_data(o, table, r);
     measure_progress_end(o->progress);
     return status;
 }

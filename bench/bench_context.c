@@ -101,6 +101,7 @@ int bench_context_draw(bench_context *c, double lod_px, int samples, float *rgba
     measure_progress_step(c->progress, lod_px > 0 ? "coarse levels" : "finest level");
     c->settings.lod.voxel_px = lod_px > 0 ? lod_px : TRIPTYCH_ZERO;
     c->settings.all.samples = samples;
+    draw_settings_drop_kind(&c->settings, triptych_is_scene(c->t));
     int status = draw_settings_use(c->t, &c->settings);
     const double start = trip_now_ms();
     if (!status)

@@ -167,12 +167,18 @@ static void describe(const flying *m)
     cJSON *settings = m->report->settings;
     char text[64];
     cJSON_AddStringToObject(settings, "data_set", o->input);
-    snprintf(text, sizeof text, "%lld x %lld x %lld", (long long)info->dims[0],
-             (long long)info->dims[1], (long long)info->dims[2]);
-    cJSON_AddStringToObject(settings, "grid", text);
-    cJSON_AddNumberToObject(settings, "stored_bytes", (double)info->bytes);
-    cJSON_AddStringToObject(settings, "transfer_function",
-                            o->tf ? o->tf : "stored in the data set");
+    const triptych_scene *scene = &m->flyer.opened.scene;
+    if (m->flyer.opened.is_scene) {
+        cJSON_AddNumberToObject(settings, "gaussians", (double)scene->gaussians);
+        cJSON_AddNumberToObject(settings, "stored_bytes", (double)scene->bytes);
+    } else {
+        snprintf(text, sizeof text, "%lld x %lld x %lld", (long long)info->dims[0],
+                 (long long)info->dims[1], (long long)info->dims[2]);
+        cJSON_AddStringToObject(settings, "grid", text);
+        cJSON_AddNumberToObject(settings, "stored_bytes", (double)info->bytes);
+        cJSON_AddStringToObject(settings, "transfer_function",
+                                o->tf ? o->tf : "stored in the data set");
+    }
     bench_report_add_size(settings, o->sizes[0]);
     cJSON_AddStringToObject(settings, "options_of_render", "none: the viewer draws its default");
     cJSON_AddStringToObject(settings, "renderer", m->status.renderer);

@@ -46,7 +46,8 @@ typedef struct bench_options {
     "  levels     error of each coarse level; cost of finer and finer volumes\n"                   \
     "  popping    jumps of pixels while the list of highest weight changes\n"                      \
     "  ewa        error and time of the affine EWA footprints\n"                                   \
-    "  orders     ordering methods of Hofsetz & Max 2005, Tables 1 and 2\n"                        \
+    "  orders     ordering methods of Hofsetz & Max 2005, Tables 1 and 2; the orders\n"            \
+    "             of a Gaussian scene, and lists beside a sort in each frame\n"                    \
     "  submit     forms of submission of Hofsetz, Max & Bastos 2008, Tables 3, 4\n"                \
     "  variants   changes of the picture by the shortcuts of the papers\n"
 

@@ -9,6 +9,8 @@ int bench_orders(bench_scene *scene, const bench_options *o, bench_report *r);
 int bench_submit(bench_scene *scene, const bench_options *o, bench_report *r);
 int bench_stream(bench_scene *scene, const bench_options *o, bench_report *r);
 int bench_popping(bench_scene *scene, const bench_options *o, bench_report *r);
+/* Measures the orders of a Gaussian scene. */
+int bench_gaussians(const bench_options *o, bench_report *r);
 /* With s NULL, measures volumes that it makes. */
 int bench_levels(const session *s, const bench_options *o, bench_report *r);
 int bench_finer(const bench_options *o, bench_report *r);

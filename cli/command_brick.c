@@ -174,11 +174,14 @@ static int read_type(const trip_option *row, const char *text, void *base)
 static const char *const endians[] = { "little", "big", NULL };
 static const char *const code_bits[] = { "auto", "8", "16", NULL };
 static const char *const normals[] = { "auto", "compact", "full", "none", "stored", NULL };
+static const char *const harmonics[] = { "auto", "palette", "whole", NULL };
 static const char *const halos[] = { "1", "0", NULL };
 
 /* The names are in the order of the library's values. */
 _Static_assert(TRIPTYCH_CODE_BITS_AUTO == 0 && TRIPTYCH_CODE_BITS_16 == 2, "code_bits");
 _Static_assert(TRIPTYCH_NORMALS_AUTO == 0 && TRIPTYCH_NORMALS_STORED == 4, "normals");
+_Static_assert(TRIPTYCH_STORED_HARMONICS_AUTO == 0 && TRIPTYCH_STORED_HARMONICS_WHOLE == 2,
+               "harmonics");
 _Static_assert(TRIPTYCH_LEVELS_FOR_AUTO == 0 && TRIPTYCH_LEVELS_FOR_BOTH == 3, "levels_for");
 
 #define AT(member) .at = offsetof(options, member)
@@ -240,6 +243,11 @@ static const trip_option rows[] = {
       "auto", .group = DRAW_GROUP_STORED, AT(brick.code_bits), CHOICE(code_bits) },
     { "halo", "0|1", "Keeps the transparent neighbours of kept voxels, for interpolation", "1",
       .group = DRAW_GROUP_STORED, AT(brick.no_halo), CHOICE(halos) },
+    { "harmonics", "palette|whole|auto",
+      "Stores the harmonics of a Gaussian scene by a palette (2 bytes a Gaussian) or whole (a byte "
+      "a "
+      "coefficient); auto is palette if colours change by less than 0.5 of 255, else whole",
+      "auto", .group = DRAW_GROUP_STORED, AT(brick.harmonics), CHOICE(harmonics) },
     { "levels", "N|auto",
       "Sets the number of coarse levels, 0 to 24, each with half the resolution of the one before; "
       "auto goes down to one brick",
@@ -475,10 +483,11 @@ static int brick(triptych *t, const options *o)
 /* Refuses options that bricking a scene would ignore. */
 static int check_scene_options(const options *o, bool cloud)
 {
-    static const char *const used[] = { "force", "json", "output", "memory", "threads" };
+    const char *const used[] = { "force", "json", "output", "memory",
+                                 cloud ? "threads" : "harmonics" };
     for (size_t i = 0; i < brick_table.count; i++) {
         bool is_used = !trip_option_is_set(&rows[i], o);
-        for (size_t n = 0; n < sizeof used / sizeof *used - !cloud; n++)
+        for (size_t n = 0; n < sizeof used / sizeof *used; n++)
             is_used |= !strcmp(rows[i].name, used[n]);
         if (!is_used)
             return library_fail_scene_option(rows[i].name);
@@ -497,6 +506,9 @@ static int print_scene(const options *o, const triptych_gaussians *g, uint64_t b
         add_number(root, "gaussians", (double)g->count);
         add_number(root, "left_out", (double)g->left_out);
         add_number(root, "degree", g->degree);
+        add_number(root, "coarse_gaussians", (double)g->coarse);
+        add_number(root, "palette_entries", (double)g->palette);
+        add_number(root, "palette_error", g->palette_error);
         add_number(root, "bytes", (double)bytes);
         add_number(root, "seconds", seconds);
         add_number(root, "peak_rss_bytes", (double)trip_memory_peak_rss_bytes());
@@ -507,6 +519,12 @@ static int print_scene(const options *o, const triptych_gaussians *g, uint64_t b
     print_name("data set", o->output);
     printf("%-9s %s Gaussians, harmonics up to degree %d (%s)\n", "scene",
            size_print_count(g->count, count), g->degree, g->format);
+    if (g->palette)
+        printf("%-9s a palette of %s entries; colours change by %.2f of 255 on average\n",
+               "harmonics", size_print_count(g->palette, count), 255 * g->palette_error);
+    else if (g->palette_error > 0)
+        printf("%-9s whole; a palette would change colours by %.2f of 255 on average\n",
+               "harmonics", 255 * g->palette_error);
     printf("%-9s %s on disk, in three lists\n", "size", trip_format_bytes(bytes, size));
     printf("%-9s %.2f s, %.2f million Gaussians/s\n", "time", seconds,
            (double)g->count / 1e6 / (seconds > 0 ? seconds : 1));
@@ -541,6 +559,8 @@ static int run(options *o)
     if (scene == 2)
         status = trip_fail(TRIP_USAGE, "usage", o->volume,
                            "is a data set already; `triptych render` draws it");
+    if (!status && !scene && triptych_is_scene_file(o->volume))
+        status = library_fail_scene(o->volume);
     if (!status)
         status = scene ? brick_scene(t, o, scene == 3) : o->dry_run ? dry_run(t, o) : brick(t, o);
     trip_progress_end(&progress);

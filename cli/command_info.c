@@ -16,6 +16,7 @@
 #include "json.h"
 #include "library.h"
 #include "own_file_info.h"
+#include "placed_input.h"
 #include "point_info_print.h"
 #include "command_line.h"
 #include "report.h"
@@ -590,6 +591,8 @@ int trip_command_info(int argc, char **argv)
         status = gaussian_info_print(d.t, o.path, p.sets[VOLUME].given, o.json != 0);
     else if (status == 0 && triptych_is_points(d.t, o.path))
         status = point_info_print(d.t, o.path, p.sets[VOLUME].given, o.json != 0);
+    else if (status == 0 && !o.verify && triptych_is_scene_file(o.path))
+        status = placed_input_print(d.t, o.path, p.sets[VOLUME].given, o.json != 0);
     else if (status == 0 && !o.verify && own_file_wanted(o.path))
         status = own_file_info(o.path, o.json != 0);
     else if (status == 0)

@@ -12,6 +12,7 @@
 #include "flight.h"
 #include "library.h"
 #include "piped_tf.h"
+#include "placed_input.h"
 #include "render_files.h"
 #include "render_options.h"
 #include "render_stats.h"
@@ -28,6 +29,7 @@ typedef struct drawing {
     render_options o;
     piped_tf function;
     cached_volume volume; /* if the input is a volume */
+    placed_input placed;  /* if the input is a scene file */
     char *choices_folder;
     triptych *t;
     float *rgba, *depth; /* depth is NULL without --depth */
@@ -96,8 +98,8 @@ static int open_data(drawing *d, const char *path)
     triptych_resources resources = o->resources;
     resources.keep_pages = d->sequence.frames > 1;
     resources.name = o->input;
-    int status = triptych_open(d->t, path, &resources);
-    return status ? status : library_add(d->t, o->more, o->more_count, o->heat);
+    int status = placed_input_open(&d->placed, d->t, path, &resources);
+    return status || d->placed.count ? status : library_add(d->t, o->more, o->more_count, o->heat);
 }
 
 static int open_from_cache(drawing *d)
@@ -123,23 +125,87 @@ static int open_volume(drawing *d)
     return status;
 }
 
+/* Returns whether the inputs are objects with places of their own. */
+static bool places_objects(const drawing *d)
+{
+    const render_options *o = &d->o;
+    bool scenes = triptych_is_gaussians(d->t, o->input) != 0;
+    for (int i = 0; i < o->more_count; i++)
+        scenes |= triptych_is_gaussians(d->t, o->more[i]) || triptych_is_scene_file(o->more[i]);
+    return triptych_is_scene_file(o->input) || o->place || (o->more_count && scenes);
+}
+
+/* Checks the settings of the kinds of objects. Settings of one kind do not concern the others. */
+static int check_objects(const drawing *d)
+{
+    const render_options *o = &d->o;
+    unsigned scenes = 0;
+    for (unsigned i = 0; i < d->placed.count; i++)
+        scenes += triptych_is_gaussians(d->t, d->placed.given[i].path) != 0;
+    const bool mixed = scenes && scenes < d->placed.count;
+    int status = mixed ? 0 : draw_settings_check_kind(&o->settings, &o->resources, scenes > 0);
+    if (!status && o->quality.error > 0)
+        status = trip_option_fail("--error", "does not apply to several objects in one picture");
+    if (!status && o->field == RENDER_FIELD_SOURCE)
+        status = trip_option_fail("--field", "source does not apply to objects with places");
+    if (!status && o->heat)
+        status = trip_option_fail("--emission", "does not apply to objects with places");
+    if (!status && scenes == d->placed.count && (o->function.name || o->function.window > 0))
+        status = library_fail_scene_option(o->function.name ? "tf" : "window");
+    return status;
+}
+
+/* Several inputs without places must be data sets of one volume. */
 static int check_input(const drawing *d)
 {
     const render_options *o = &d->o;
-    const int is_scene = triptych_is_gaussians(d->t, o->input);
-    /* The library checks a data set of a scene. It may hold a cloud. */
-    int status = draw_settings_check_kind(&o->settings, !is_scene       ? DRAW_KIND_VOLUME
-                                                        : is_scene == 1 ? DRAW_KIND_SCENE
-                                                                        : DRAW_KIND_CLOUD);
-    if (!status && is_scene && o->more_count)
-        status = trip_option_fail(o->input, "is a Gaussian scene; give one scene at a time");
+    for (int i = 0; i < o->more_count; i++) {
+        const char *volume = cached_volume_wanted(o->input)     ? o->input
+                             : cached_volume_wanted(o->more[i]) ? o->more[i]
+                                                                : NULL;
+        if (volume)
+            return trip_option_fail(volume, TRIP_ONE_VOLUME_A_PICTURE);
+    }
+    const bool is_scene = triptych_is_gaussians(d->t, o->input) != 0;
+    int status = library_check_kind(d->t, o->input, &o->settings, &o->resources, &o->function);
     if (!status && is_scene && o->quality.error > 0)
         status = library_fail_scene_option("error");
     return status;
 }
 
+/* Finds or makes the data sets of a scene file. */
+static int find_objects(drawing *d)
+{
+    const cached_wish wish = wish_of(d);
+    const char *inputs[1 + RENDER_MORE_MAX] = { d->o.input };
+    const bool file = triptych_is_scene_file(d->o.input);
+    if (file && (d->o.more_count || d->o.place))
+        return trip_option_fail(d->o.input,
+                                "is a scene file, which lists and places all objects; leave "
+                                "out other inputs and --place");
+    memcpy(inputs + 1, d->o.more, (size_t)d->o.more_count * sizeof *inputs);
+    int status = file ? placed_input_read(&d->placed, d->t, d->o.input, &wish.options)
+                      : placed_input_list(&d->placed, d->t, inputs, (unsigned)d->o.more_count + 1,
+                                          d->o.place, &wish.options);
+    trip_progress_end(&d->progress);
+    if (!status && d->placed.bricked && !has_no_summary(&d->o)) {
+        trip_text_write(stdout, d->o.input);
+        printf(": %u of its %u objects bricked into the cache in %.2f s\n", d->placed.bricked,
+               d->placed.count, d->placed.seconds);
+    }
+    return status;
+}
+
 static int open_input(drawing *d)
 {
+    if (places_objects(d)) {
+        int found = find_objects(d);
+        if (!found)
+            found = check_objects(d);
+        if (!found)
+            found = open_data(d, d->o.input);
+        return found ? found : triptych_set_transfer_function(d->t, &d->o.function);
+    }
     const int checked = check_input(d);
     if (checked)
         return checked;
@@ -197,6 +263,7 @@ static void close_drawing(drawing *d)
         triptych_close(d->t); /* frees rgba and depth too */
     }
     cached_volume_close(&d->volume);
+    placed_input_close(&d->placed);
     free(d->choices_folder);
 }
 
@@ -360,6 +427,7 @@ static int draw_in_flight(drawing *d, int *first)
     const flight f = { .o = &d->o,
                        .sequence = &d->sequence,
                        .data = data_path(d),
+                       .placed = &d->placed,
                        .contexts = contexts_of(d),
                        .write = write_image,
                        .then = finish_image,

@@ -70,7 +70,6 @@ static int parse_options(serve_options *o, int argc, char **argv)
 {
     const uint64_t only_tf = ~(UINT64_C(1) << LOOK_TF);
     const uint64_t files = UINT64_C(1) << DRAW_DEPTH | UINT64_C(1) << DRAW_COUNT;
-    const uint64_t scenes = UINT64_C(1) << DRAW_ORDER | UINT64_C(1) << DRAW_HARMONICS;
     const uint64_t integral = UINT64_C(1) << DRAW_FIELD | UINT64_C(1) << DRAW_TOLERANCE;
     const uint64_t others = UINT64_C(1) << RESOURCE_RENDERER | UINT64_C(1) << RESOURCE_OCCLUDED;
     parse p = { .o = o,
@@ -79,7 +78,7 @@ static int parse_options(serve_options *o, int argc, char **argv)
                     [LOOK] = { .table = &look_table, .base = &o->look, .without = only_tf },
                     [SETTINGS] = { .table = &draw_settings_table,
                                    .base = &o->params.settings,
-                                   .without = files | integral | scenes },
+                                   .without = files | integral },
                     [HEAT] = { .table = &heat_table, .base = &o->params.heat },
                     [QUALITY] = { .table = &quality_table, .base = &o->quality },
                     [RENDERER] = { .table = &viewer_renderer_table, .base = &o->resources },
@@ -90,7 +89,8 @@ static int parse_options(serve_options *o, int argc, char **argv)
                 } };
     const command_line c = {
         .args_doc = "VOLUME|NAME.trip",
-        .doc = "Shows a volume or a data set in a browser, at the address that this command "
+        .doc = "Shows a volume, a Gaussian scene or a data set in a browser, at the address that "
+               "this command "
                "prints, until it is interrupted. A moving view is sent as JPEG. At rest the page "
                "gets the picture of `triptych render` as PNG. The server listens to 127.0.0.1 "
                "only, and answers only requests with the token in the address. To look from "
@@ -114,12 +114,11 @@ static int check_input(const serve_options *o)
 {
     const trip_serve_params *p = &o->params;
     triptych *t = NULL;
-    const triptych_resources resources = { .memory_bytes = p->memory_bytes };
     int status = library_create(&t, NULL);
     if (!status)
-        status = viewed_volume_check(&o->volume, t, p->input, &resources);
+        status = viewed_volume_check(&o->volume, t, p->input, &o->resources);
     if (!status)
-        status = library_check_heat(t, p->heat, &resources);
+        status = library_check_heat(t, p->heat, &o->resources);
     triptych_destroy(t);
     return status;
 }

@@ -118,7 +118,6 @@ static int parse_options(view_command *o, int argc, char **argv)
 {
     const uint64_t window = UINT64_C(1) << LOOK_LEVEL | UINT64_C(1) << LOOK_WINDOW;
     const uint64_t files = UINT64_C(1) << DRAW_DEPTH | UINT64_C(1) << DRAW_COUNT;
-    const uint64_t scenes = UINT64_C(1) << DRAW_ORDER | UINT64_C(1) << DRAW_HARMONICS;
     const uint64_t integral = UINT64_C(1) << DRAW_FIELD | UINT64_C(1) << DRAW_TOLERANCE;
     const uint64_t others = UINT64_C(1) << RESOURCE_RENDERER | UINT64_C(1) << RESOURCE_OCCLUDED;
     parse p = { .o = o,
@@ -130,7 +129,7 @@ static int parse_options(view_command *o, int argc, char **argv)
                     [LOOK] = { .table = &look_table, .base = &o->look, .without = window },
                     [SETTINGS] = { .table = &draw_settings_table,
                                    .base = &o->params.settings,
-                                   .without = files | integral | scenes },
+                                   .without = files | integral },
                     [HEAT] = { .table = &heat_table, .base = &o->params.heat },
                     [QUALITY] = { .table = &quality_table, .base = &o->quality },
                     [RENDERER] = { .table = &viewer_renderer_table, .base = &o->resources },
@@ -141,7 +140,8 @@ static int parse_options(view_command *o, int argc, char **argv)
                 } };
     const command_line c = {
         .args_doc = "[VOLUME|NAME.trip...]",
-        .doc = "Shows volumes or data sets in a window, where you turn, cut, classify and fly "
+        .doc = "Shows volumes, Gaussian scenes or data sets in a window, where you turn, cut, "
+               "classify and fly "
                "through them. A moving view is drawn with as little detail as keeps to --fps. At "
                "rest the picture equals the picture of `triptych render`, bit for bit. A volume is "
                "first bricked into a cache; `triptych cache` lists and clears the cache.\vF1 lists "
@@ -181,12 +181,11 @@ static int check_output(void *user, const char *path)
 static int check_inputs(view_command *o)
 {
     triptych *t = NULL;
-    const triptych_resources resources = { .memory_bytes = o->params.memory_bytes };
     int status = library_create(&t, NULL);
     for (int i = 0; i < o->params.count && !status; i++)
-        status = viewed_volume_check(&o->volume, t, o->inputs[i], &resources);
+        status = viewed_volume_check(&o->volume, t, o->inputs[i], &o->resources);
     if (!status)
-        status = library_check_heat(t, o->params.heat, &resources);
+        status = library_check_heat(t, o->params.heat, &o->resources);
     if (!status && o->params.script)
         status = note_read(o, t);
     triptych_destroy(t);

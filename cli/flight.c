@@ -60,8 +60,8 @@ static int open_data(pilot *p)
     resources.keep_pages = 1;
     resources.name = o->input;
     if (!status)
-        status = triptych_open(p->t, f->data, &resources);
-    if (!status)
+        status = placed_input_open(f->placed, p->t, f->data, &resources);
+    if (!status && !f->placed->count)
         status = library_add(p->t, o->more, o->more_count, o->heat);
     if (!status)
         status = triptych_set_transfer_function(p->t, &o->function);

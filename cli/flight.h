@@ -4,12 +4,14 @@
 #ifndef TRIP_CLI_FLIGHT_H
 #define TRIP_CLI_FLIGHT_H
 
+#include "placed_input.h"
 #include "sequence.h"
 
 typedef struct flight {
     const render_options *o;
     const sequence *sequence;
     const char *data; /* path of the data set */
+    const placed_input *placed;
     int contexts;
     /* write() writes a frame's picture and distances (NULL without --depth). Any thread calls it,
      * in any order. then() runs once for each frame, in the order of the frames, never twice at

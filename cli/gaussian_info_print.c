@@ -100,6 +100,7 @@ static int print_scene_json(const triptych_scene *s, const cJSON *notes, const c
     add_box(root, "typical_bounds", s->typical_lo, s->typical_hi);
     cJSON_AddNumberToObject(root, "bytes", (double)s->bytes);
     cJSON_AddNumberToObject(root, "bricks", (double)s->bricks);
+    cJSON_AddNumberToObject(root, "coarse_gaussians", (double)s->coarse);
     if (verified)
         cJSON_AddTrueToObject(root, "verified");
     cJSON_AddItemToObject(root, "source", cJSON_Duplicate(notes, true));
@@ -142,6 +143,7 @@ static void print_scene_text(const triptych_scene *s, const cJSON *notes, const 
         printf("%-12s opacity is compensated for the blur of a pixel\n", "antialiased");
     printf("%-12s %s in three lists of %llu bricks\n", "size", trip_format_bytes(s->bytes, bytes),
            (unsigned long long)s->bricks);
+    printf("%-12s %llu Gaussians of coarse levels\n", "levels", (unsigned long long)s->coarse);
     print_note("source", notes, "input");
     print_note("file format", notes, "format");
     print_note("comments", notes, "trainer");

@@ -85,10 +85,37 @@ int library_check_scene_options(const triptych_brick_options *options)
     return 0;
 }
 
-int library_fail_scene(const char *input, int kind)
+int library_check_file_options(const triptych_brick_options *options, int kind)
+{
+    return kind == 3 ? library_check_cloud_options(options)
+           : kind    ? library_check_scene_options(options)
+                     : 0;
+}
+
+bool library_is_scene(triptych *t, const char *input)
+{
+    return triptych_is_scene_file(input) || triptych_is_gaussians(t, input);
+}
+
+int library_fail_scene(const char *input)
 {
     return trip_fail(TRIP_USAGE, "usage", input, "is a %s; `triptych render` draws it",
-                     kind == 3 ? "cloud of points" : "Gaussian scene");
+                     triptych_is_scene_file(input) ? "scene file" : "Gaussian scene");
+}
+
+int library_check_kind(triptych *t, const char *input, const draw_settings *settings,
+                       const triptych_resources *resources,
+                       const triptych_transfer_function *function)
+{
+    const int is_scene = triptych_is_gaussians(t, input);
+    /* The library checks a data set of a scene. It may hold a cloud. */
+    const draw_kind kind = !is_scene       ? DRAW_KIND_VOLUME
+                           : is_scene == 1 ? DRAW_KIND_SCENE
+                                           : DRAW_KIND_CLOUD;
+    int status = draw_settings_check_kind(settings, resources, kind);
+    if (!status && is_scene && (function->name || function->window > 0))
+        status = library_fail_scene_option(function->name ? "tf" : "window");
+    return status;
 }
 
 void library_hush(triptych *t, bool quiet)

@@ -5,8 +5,8 @@
 
 #include <stdbool.h>
 
+#include "draw_settings.h"
 #include "progress.h"
-#include "triptych.h"
 #include "triptych_brick.h"
 
 /* Creates a context. `progress` may be NULL and must outlive the context. Returns 0 or a reported
@@ -18,17 +18,25 @@ int library_add(triptych *t, const char *const *paths, int count, const char *he
 /* Fails if `heat` is neither NULL nor a usable data set of heat. Closes the open data set. */
 int library_check_heat(triptych *t, const char *heat, const triptych_resources *resources);
 
-/* Switches the messages of the context off or on. */
+/* Fails if an option does not apply to the input: a Gaussian scene or a volume. */
+int library_check_kind(triptych *t, const char *input, const draw_settings *settings,
+                       const triptych_resources *resources,
+                       const triptych_transfer_function *function);
 /* Fails: an option does not apply to Gaussian scenes. */
 int library_fail_scene_option(const char *name);
 /* Fails if options for reading a volume were given for a Gaussian scene. */
 int library_check_scene_options(const triptych_brick_options *options);
 /* Fails if options that a cloud of points does not have were given for one. */
 int library_check_cloud_options(const triptych_brick_options *options);
-/* Fails: a command that needs volumes got a scene. `kind` is the result of triptych_is_gaussians().
- */
-int library_fail_scene(const char *input, int kind);
+/* Fails if options for reading were given that do not apply to a file, by the result of
+ * triptych_is_gaussians(). */
+int library_check_file_options(const triptych_brick_options *options, int kind);
+/* Whether an input is a Gaussian scene, or a scene file. */
+bool library_is_scene(triptych *t, const char *input);
+/* Fails: a command that needs volumes got such an input. */
+int library_fail_scene(const char *input);
 
+/* Switches the messages of the context off or on. */
 void library_hush(triptych *t, bool quiet);
 /* Sets the transfer function without printing warnings. Reports failures. */
 int library_set_function_quietly(triptych *t, const triptych_transfer_function *function);

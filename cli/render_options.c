@@ -32,6 +32,11 @@ static const trip_option rows[] = {
       NULL, "excludes --orbit and the options of the view",
       .brief = "Draws pictures along a camera path", .group = DRAW_GROUP_PATHS,
       .type = TRIP_OPTION_TEXT, AT(path) },
+    { "place", "X,Y,Z[,SCALE][;...]",
+      "Moves and scales each input in the picture, in the order of the inputs; ';' stands between "
+      "them",
+      NULL, "a scene file places its objects itself", .brief = "Moves and scales each input",
+      .group = DRAW_GROUP_VIEW, .type = TRIP_OPTION_TEXT, AT(place) },
     { "depth", "FILE",
       "Writes the mean distance from the eye to the visible object at each pixel, in world units: "
       ".exr or .tif",
@@ -104,16 +109,10 @@ static int add_input(void *user, char *path)
     return 0;
 }
 
-/* Several inputs must be data sets, not volumes. */
 static int check_more(const render_options *o)
 {
-    for (int i = 0; i < o->more_count; i++) {
-        const char *volume = cached_volume_wanted(o->input)     ? o->input
-                             : cached_volume_wanted(o->more[i]) ? o->more[i]
-                                                                : NULL;
-        if (volume)
-            return trip_option_fail(volume, TRIP_ONE_VOLUME_A_PICTURE);
-    }
+    if (o->place)
+        return 0;
     if (o->more_count && draw_settings_has_levels(&o->settings))
         return trip_option_fail(
             "--lod, --max-bytes, --max-ms",

@@ -22,6 +22,7 @@ typedef struct render_options {
     const char *input;                 /* a data set or volume */
     const char *more[RENDER_MORE_MAX]; /* further data sets in the same picture */
     int more_count;
+    const char *place;  /* of each input, or NULL */
     const char *output; /* an image file or a video; several images add a number to its name */
     const char *heat;   /* data set of --emission, or NULL */
     triptych_brick_options volume; /* only the fields for reading a volume are set */

@@ -172,6 +172,16 @@ static int add_camera(cJSON *frame, triptych *t)
     return status || added ? status : out_of_memory();
 }
 
+/* Adds the Gaussians of each object, if there are several. */
+static void add_objects(cJSON *frame, triptych *t)
+{
+    const uint64_t *drawn;
+    const unsigned count = triptych_get_objects(t, &drawn);
+    cJSON *list = count > 1 ? cJSON_AddArrayToObject(frame, "gaussians_by_object") : NULL;
+    for (unsigned i = 0; list && i < count; i++)
+        cJSON_AddItemToArray(list, cJSON_CreateNumber((double)drawn[i]));
+}
+
 int render_stats_add_frame(render_stats *s, triptych *t)
 {
     triptych_frame_stats frame;
@@ -195,6 +205,7 @@ int render_stats_add_frame(render_stats *s, triptych *t)
     if (triptych_is_scene(t)) {
         cJSON_AddNumberToObject(f, "gaussians", (double)frame.splats);
         cJSON_AddNumberToObject(f, "bytes_read", (double)frame.bytes_read);
+        add_objects(f, t);
     }
     cJSON *lists = cJSON_AddObjectToObject(f, "lists");
     if (!f || !lists || !cJSON_AddItemToArray(s->frames, f)) {
@@ -249,10 +260,15 @@ static void add_interpolation(cJSON *root, triptych_interpolation drawn)
                                 draw_settings_choice(&s, DRAW_INTERPOLATION));
 }
 
-static void add_scene_method(cJSON *root, const draw_settings *s, const triptych_frame_stats *frame)
+static void add_scene_method(cJSON *root, const render_options *o,
+                             const triptych_frame_stats *frame)
 {
+    const draw_settings by_depth = { .scene.order = TRIPTYCH_ORDER_DEPTH };
+    const draw_settings *s = o->settings.scene.order ? &o->settings : &by_depth;
     cJSON_AddStringToObject(root, "order",
-                            s->scene.order == TRIPTYCH_ORDER_LISTS ? "lists" : "depth");
+                            o->resources.renderer == TRIPTYCH_RENDERER_INTEGRAL
+                                ? "integral"
+                                : draw_settings_choice(s, DRAW_ORDER));
     cJSON_AddStringToObject(root, "kernel",
                             frame->footprint
                                 ? footprint_names[frame->footprint - TRIPTYCH_FOOTPRINT_EXACT]
@@ -296,7 +312,7 @@ int render_stats_describe(render_stats *s, const render_options *o, triptych *t)
     cJSON_AddStringToObject(root, "renderer", frame.renderer);
     cJSON_AddStringToObject(root, "device", frame.device);
     if (triptych_is_scene(t))
-        add_scene_method(root, &o->settings, &frame);
+        add_scene_method(root, o, &frame);
     else
         add_method(root, o, &frame);
     if (frame.lod_px > 0)
@@ -404,6 +420,11 @@ int render_stats_explain_cost(const render_options *o, triptych *t, FILE *out)
         status = each_list(t, explain_list, &c);
     if (status)
         return status;
+    const uint64_t *drawn;
+    const unsigned objects = triptych_get_objects(t, &drawn);
+    for (unsigned i = 0; i < objects && objects > 1; i++)
+        fprintf(out, "object %-4u %" PRIu64 " Gaussians read in the order of drawing\n", i + 1,
+                drawn[i]);
     if (frame.bytes_cached)
         fprintf(out, "cache       %s from memory\n", trip_format_bytes(frame.bytes_cached, bytes));
     if (frame.bytes_occluded)

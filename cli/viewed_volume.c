@@ -48,6 +48,7 @@ int viewed_volume_choose(viewed_volume *s, quality_options *q, const char *input
     s->options.levels_for = quality_options_levels(q, coarse_splats);
     s->measured_volume = input;
     s->measured = q->error > 0 ? q->measured : NULL;
+    s->settings = settings;
     return status;
 }
 
@@ -66,15 +67,22 @@ static int check_volume(const viewed_volume *s, triptych *t, const char *volume)
 int viewed_volume_check(const viewed_volume *s, triptych *t, const char *input,
                         const triptych_resources *resources)
 {
-    const int scene = triptych_is_gaussians(t, input);
-    if (scene)
-        return library_fail_scene(input, scene);
+    if (triptych_is_scene_file(input))
+        return library_fail_scene(input);
+    const triptych_transfer_function function = { .name = s->function };
+    const int is_scene = triptych_is_gaussians(t, input);
+    int status = library_check_kind(t, input, s->settings, resources, &function);
+    if (!status && is_scene && s->measured)
+        status = library_fail_scene_option("error");
+    if (!status && is_scene && cached_volume_wanted(input))
+        status = library_check_file_options(&s->options, is_scene);
+    if (status)
+        return status;
     if (cached_volume_wanted(input))
         return check_volume(s, t, input);
-    int status = triptych_open(t, input, resources);
+    status = triptych_open(t, input, resources);
     if (!status) /* the window prints the warnings later */
-        status =
-            library_set_function_quietly(t, &(triptych_transfer_function){ .name = s->function });
+        status = library_set_function_quietly(t, &function);
     triptych_close(t);
     return status;
 }
@@ -132,9 +140,11 @@ static int open_volume(const viewed_volume *s, cached_volume *cached, triptych *
     return status;
 }
 
-/* Returns 1 if a small data set must be made first. */
+/* Returns 1 if a small data set must be made first. Scenes have none. */
 static int is_large(const viewed_volume *s, triptych *t, const char *volume)
 {
+    if (triptych_is_gaussians(t, volume))
+        return 0;
     const cached_wish wish = wish_of(s, volume, false);
     cached_volume found = { .hold = -1 };
     triptych_identity identity;

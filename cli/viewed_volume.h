@@ -15,6 +15,7 @@ typedef struct viewed_volume {
     /* The volume that --error applies to, and the checksum of the measured data set (see
      * quality_options.h). NULL without --error. */
     const char *measured_volume, *measured;
+    const draw_settings *settings; /* of the command line */
     bool samples; /* true: for a large volume that is not in the cache, first finds a small data set
                      from samples */
     cached_volume cached; /* zeroed before its first use */
@@ -25,9 +26,10 @@ typedef struct viewed_volume {
 int viewed_volume_choose(viewed_volume *s, quality_options *q, const char *input,
                          draw_settings *settings, triptych_renderer *renderer);
 
-/* Checks the inputs before anything is shown. A data set must open and accept the transfer
- * function. A volume must exist in a known format, and its transfer function must load. The context
- * has no data set open before the call or after it. */
+/* Checks the inputs before anything is shown. All settings must apply to a volume or to a Gaussian
+ * scene. A data set must open and accept the transfer function. A volume must exist in a known
+ * format, and its transfer function must load. The context has no data set open before the call or
+ * after it. */
 int viewed_volume_check(const viewed_volume *s, triptych *t, const char *input,
                         const triptych_resources *resources);
 

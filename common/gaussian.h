@@ -4,6 +4,9 @@
 #ifndef TRIP_GAUSSIAN_H
 #define TRIP_GAUSSIAN_H
 
+#include <stdbool.h>
+#include <stdint.h>
+
 enum { TRIP_SH_DEGREE_MAX = 3, TRIP_SH_MAX = 16 };
 
 typedef struct trip_gaussian {
@@ -14,6 +17,9 @@ typedef struct trip_gaussian {
     /* Spherical harmonics of the display colour: coefficient, then channel. The colour is 0.5 plus
      * their sum (gaussian_colour.h). Coefficients beyond the scene's degree are 0. */
     float sh[TRIP_SH_MAX][3];
+    /* Trained with a compensated opacity, as trip_gaussian_settings.antialiased says of all. */
+    bool antialiased;
+    uint64_t merged; /* 1: of a coarse level, where it stands for Gaussians of the scene */
 } trip_gaussian;
 
 /* Returns the number of coefficients up to a degree: 1, 4, 9 or 16. */

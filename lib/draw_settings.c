@@ -288,7 +288,7 @@ static const char *const primitives[] = { "sprites", "triangles", NULL };
 static const char *const targets[] = { "rgba32f", "rgba16f", "rgba8", NULL };
 static const char *const traversals[] = { "outward", "ascending", NULL };
 static const char *const weights[] = { "pixel", "vertex", NULL };
-static const char *const orders[] = { "depth", "lists", NULL };
+static const char *const orders[] = { "depth", "lists", "sheets", NULL };
 static const char *const degrees[] = { "0", "1", "2", "3", NULL };
 
 #define CHOICE(names) .type = TRIP_OPTION_CHOICE, .choices = (names), .first = 1
@@ -383,9 +383,9 @@ static const trip_option rows[DRAW_OPTIONS] = {
                              CHOICE(interpolations) },
     [DRAW_LOD] = { "lod", "PX|auto",
                    "Draws distant parts by coarse levels with voxels at most PX pixels wide",
-                   "auto, as --quality needs", "0 draws the finest level only",
-                   .group = DRAW_GROUP_ACCURACY, .measured = true, .type = TRIP_OPTION_AUTO_NUMBER,
-                   AT(lod.voxel_px), .lo = 0, .hi = 1000 },
+                   "auto, as --quality needs; 1 for Gaussian scenes",
+                   "0 draws the finest level only", .group = DRAW_GROUP_ACCURACY, .measured = true,
+                   .type = TRIP_OPTION_AUTO_NUMBER, AT(lod.voxel_px), .lo = 0, .hi = 1000 },
     [DRAW_MAX_BYTES] = { "max-bytes", "SIZE",
                          "Draws coarser levels, so that at most SIZE of codes and normals is in "
                          "view, for example 64M",
@@ -424,9 +424,9 @@ static const trip_option rows[DRAW_OPTIONS] = {
                      .group = DRAW_GROUP_INTEGRAL, .measured = true, AT(integral.field),
                      CHOICE(fields) },
     [DRAW_TOLERANCE] = { "tolerance", "E", "Bounds the error of each component of a pixel",
-                         "1e-3, and 1e-4 with --samples", .group = DRAW_GROUP_INTEGRAL,
-                         .measured = true, .type = TRIP_OPTION_NUMBER, AT(integral.tolerance),
-                         .lo = 1e-12, .hi = 0.1 },
+                         "1e-3; with --samples 1e-4; for Gaussian scenes 5e-5",
+                         .group = DRAW_GROUP_INTEGRAL, .measured = true, .type = TRIP_OPTION_NUMBER,
+                         AT(integral.tolerance), .lo = 1e-12, .hi = 0.1 },
     [DRAW_COMPOSITING] = { "compositing", "splat|sheet",
                            "Selects the unit of compositing: each splat in list order, or the sum "
                            "of the splats of a sheet",
@@ -485,12 +485,17 @@ static const trip_option rows[DRAW_OPTIONS] = {
                        "from the corners of splats, which implies --renderer reference",
                        "pixel", "pre only", .group = DRAW_GROUP_PAPERS, .measured = true,
                        AT(splat.weights), CHOICE(weights) },
-    [DRAW_ORDER] = { "order", "depth|lists",
-                     "Selects the order of the Gaussians of a scene: by the depth of their "
-                     "centres, "
-                     "or by the three lists",
+    [DRAW_ORDER] = { "order", "NAME",
+                     "Selects the order of the Gaussians of a scene: depth (of their centres), "
+                     "lists, or sheets, in which they overlap",
                      "depth", "Gaussian scenes only", .group = DRAW_GROUP_ACCURACY,
                      .measured = true, AT(scene.order), CHOICE(orders) },
+    [DRAW_SHEET] = { "sheet", "LENGTH",
+                     "Sets the thickness of the sheets in units of the scene; thinner ones come "
+                     "closer to the integral and take longer",
+                     "a 1024th of the scene's radius", "requires --order sheets",
+                     .group = DRAW_GROUP_ACCURACY, .measured = true, .type = TRIP_OPTION_NUMBER,
+                     AT(scene.sheet), .lo = 1e-12, .hi = 1e12 },
     [DRAW_HARMONICS] = { "sh", "DEGREE",
                          "Reads spherical harmonics up to this degree: 0, 1, 2 or 3",
                          "all of the scene", "Gaussian scenes only", .group = DRAW_GROUP_ACCURACY,

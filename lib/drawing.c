@@ -60,7 +60,9 @@ void trip_context_drop_renderer(triptych *t)
     trip_context_drop_light(t);
     if (t->renderer)
         t->renderer->ops->destroy(t->renderer);
-    t->renderer = NULL;
+    if (t->device_renderer)
+        t->device_renderer->ops->destroy(t->device_renderer);
+    t->renderer = t->device_renderer = NULL;
 }
 
 /* Makes a reader for the wanted planes, or keeps the current one if it serves. Readers serve all
@@ -359,7 +361,7 @@ static int prepare(triptych *t)
     if (!status)
         status = draw_settings_check(&t->given, &renderer, false);
     if (!status)
-        status = draw_settings_check_kind(&t->given, DRAW_KIND_VOLUME);
+        status = draw_settings_check_kind(&t->given, r, DRAW_KIND_VOLUME);
     if (status)
         return status;
     if (t->renderer && t->required != renderer)
@@ -477,7 +479,7 @@ int triptych_choose(triptych *t)
 {
     trip_scope *before = trip_context_enter_anew(t);
     const int later = t->resources.choose_later;
-    if (t->scene) /* it has no choices of quality */
+    if (trip_context_draws_scene(t)) /* it has no choices of quality */
         return trip_context_leave(before, trip_context_check_idle(t, true));
     int status = prepare(t);
     if (!status)
@@ -589,7 +591,7 @@ static int start(triptych *t)
 
 static void end(triptych *t)
 {
-    if (t->scene)
+    if (trip_context_draws_scene(t))
         trip_context_end_scene(t);
     if (t->drawn)
         trip_frame_end(&t->drawing);
@@ -603,8 +605,8 @@ static void end(triptych *t)
 int triptych_begin(triptych *t)
 {
     trip_scope *before = trip_context_enter_anew(t);
-    int status = t->scene ? trip_context_begin_scene(t) : prepare(t);
-    if (status || t->scene)
+    int status = trip_context_draws_scene(t) ? trip_context_begin_scene(t) : prepare(t);
+    if (status || trip_context_draws_scene(t))
         return trip_context_leave(before, status);
     status = plan_first(t);
     if (!status)
@@ -627,7 +629,7 @@ int triptych_await(triptych *t, uint64_t timeout_ns)
 {
     trip_scope *before = trip_context_enter(t);
     int status = check_drawing(t);
-    if (!status && !t->scene)
+    if (!status && !trip_context_draws_scene(t))
         trip_frame_await(&t->drawing, timeout_ns);
     if (!status && trip_interrupted())
         status = trip_fail(TRIP_INTERRUPTED, "render", t->name, "interrupted");
@@ -738,8 +740,8 @@ int triptych_step(triptych *t, uint64_t deadline_ns)
 {
     trip_scope *before = trip_context_enter(t);
     int status = check_drawing(t);
-    if (!status && t->scene)
-        return trip_context_leave(before, trip_gaussian_frame_step(t->scene_frame, deadline_ns));
+    if (!status && trip_context_draws_scene(t))
+        return trip_context_leave(before, trip_context_step_scene(t, deadline_ns));
     if (!status)
         status = trip_frame_step(&t->drawing, deadline_ns);
     while (status == TRIP_FRAME_DONE && has_next(t)) {
@@ -772,7 +774,7 @@ static int take_picture(triptych *t, float *rgba, float *depth)
         status = trip_fail(TRIP_USAGE, "render", "depth", "%s",
                            depth ? "the frame was begun without distances"
                                  : "the frame has distances; use triptych_picture_and_depth()");
-    if (status || t->scene)
+    if (status || trip_context_draws_scene(t))
         return status ? status : trip_context_take_scene(t, rgba, depth);
     status = take_bands(t, rgba, depth);
     if (!status && t->settings.show == TRIP_SHOW_MERGE)
@@ -798,7 +800,7 @@ void triptych_end(triptych *t)
 {
     trip_scope *before = trip_scope_enter(&t->scope); /* keeps the error of the last call */
     end(t);
-    if (!t->scene) {
+    if (!trip_context_draws_scene(t)) {
         keep_small_before(t);
         drop_banded(t);
     }

@@ -40,6 +40,7 @@ enum {
     MAY_EMIT = 1 << 26,
     NEAREST = 1 << 27,
     UNFILTERED = 1 << 28,
+    BY_SHEETS = 1 << 29,
 };
 
 static const uint64_t of_splats =
@@ -87,6 +88,13 @@ static const struct rule {
       "does not apply to --renderer integral; use --tolerance", IDLE },
     { ROW(METHOD) | ROW(H) | ROW(WEIGHTS) | ROW(TRAVERSAL) | ROW(COMPOSITING), RENDERER(INTEGRAL),
       0, 0, "does not apply to --renderer integral, which has no layers", IDLE },
+    { ROW(ORDER) | ROW(SHEET), RENDERER(INTEGRAL), 0, 0,
+      "does not apply to --renderer integral, which has no order", IDLE },
+    { ROW(ORDER), RENDERER(GL), BY_SHEETS, 0, "sheets requires --renderer cpu or reference",
+      CONFLICT },
+    { ROW(SHEET), ALL, 0, BY_SHEETS, "requires --order sheets", IDLE },
+    { ROW(LOD), ALL, BY_SHEETS, 0, "does not apply to --order sheets, which draws the finest level",
+      IDLE },
     { ROW(SHOW), RENDERER(INTEGRAL), DEBUG_VIEW, 0,
       "does not apply to --renderer integral, which has no lists and no levels", CONFLICT },
     { of_levels, RENDERER(INTEGRAL), 0, 0,
@@ -213,6 +221,7 @@ static int facts_of(const draw_settings *s)
            (s->integral.field == TRIPTYCH_FIELD_SPLATS ? FIELD_OF_SPLATS : 0) |
            (s->all.show > TRIPTYCH_SHOW_PICTURE ? DEBUG_VIEW : 0) |
            (s->all.show == TRIPTYCH_SHOW_MERGE ? SHOW_MERGE : 0) |
+           (s->scene.order == TRIPTYCH_ORDER_SHEETS ? BY_SHEETS : 0) |
            (s->all.count_exactly ? COUNTED : 0) | (s->all.samples > 1 ? SEVERAL_SAMPLES : 0) |
            facts_of_splats(s) | facts_of_effects(s);
 }
@@ -311,22 +320,110 @@ int draw_settings_check(const draw_settings *s, triptych_renderer *renderer, boo
     return broken ? fail_rule(broken, given_rows(s)) : 0;
 }
 
-int draw_settings_check_kind(const draw_settings *s, draw_kind kind)
+/* ---- kinds of data ---- */
+
+static const uint64_t of_scenes = ROW(ORDER) | ROW(SHEET) | ROW(HARMONICS);
+static const uint64_t of_both =
+    ROW(BACKGROUND) | ROW(CLIP_BOX) | ROW(CLIP_PLANE) | ROW(EARLY_TERMINATION) | ROW(FOOTPRINT) |
+    ROW(SAMPLES) | ROW(DEPTH) | ROW(NORMALISE) | ROW(METHOD) | ROW(H) | ROW(LOD) | ROW(TOLERANCE);
+
+static const uint64_t of_clouds = ROW(LIGHT) | ROW(NO_SHADING);
+
+/* A scene does not have these choices, for these reasons. */
+static const struct choice {
+    int row, choice; /* index in trip_option.choices */
+    const char *why;
+} not_of_scenes[] = {
+    { DRAW_FOOTPRINT, TRIPTYCH_FOOTPRINT_FIXED - 1, "fixed does not apply to Gaussian scenes" },
+    { DRAW_METHOD, TRIPTYCH_METHOD_IMAGE - 1, "image does not apply to Gaussian scenes" },
+};
+
+/* The order by depth has one layer, so nothing is merged. */
+static bool has_one_layer(const draw_settings *s)
 {
-    static const uint64_t of_scenes = ROW(ORDER) | ROW(HARMONICS);
-    static const uint64_t of_both = ROW(BACKGROUND) | ROW(CLIP_BOX) | ROW(CLIP_PLANE) |
-                                    ROW(EARLY_TERMINATION) | ROW(FOOTPRINT) | ROW(SAMPLES) |
-                                    ROW(DEPTH) | ROW(NORMALISE) | ROW(METHOD) | ROW(H);
-    static const uint64_t of_clouds = ROW(LIGHT) | ROW(NO_SHADING);
-    const uint64_t of_kind_too = kind == DRAW_KIND_CLOUD ? of_clouds : 0;
-    const bool is_volume = kind == DRAW_KIND_VOLUME;
+    return s->scene.order <= TRIPTYCH_ORDER_DEPTH;
+}
+
+static uint64_t rows_of_kind(const draw_settings *s, int kind)
+{
+    const uint64_t merging = ROW(METHOD) | ROW(H);
+    const uint64_t own = of_scenes | of_both | (kind == DRAW_KIND_CLOUD ? of_clouds : 0);
+    return kind ? own & (has_one_layer(s) ? ~merging : ~0ULL) : ~of_scenes;
+}
+
+bool draw_settings_applies(const draw_settings *s, int row, int kind)
+{
+    return rows_of_kind(s, kind) >> row & 1;
+}
+
+bool draw_settings_choice_applies(int row, int choice, int kind)
+{
+    for (size_t i = 0; kind && i < sizeof not_of_scenes / sizeof *not_of_scenes; i++)
+        if (not_of_scenes[i].row == row && not_of_scenes[i].choice == choice)
+            return false;
+    return true;
+}
+
+/* Returns the first choice of the settings that scenes do not have, or NULL. */
+static const struct choice *find_choice_not_of_scenes(const draw_settings *s)
+{
+    for (size_t i = 0; i < sizeof not_of_scenes / sizeof *not_of_scenes; i++) {
+        const trip_option *row = &draw_settings_table.rows[not_of_scenes[i].row];
+        if (*(const int *)((const char *)s + row->at) - row->first == not_of_scenes[i].choice)
+            return &not_of_scenes[i];
+    }
+    return NULL;
+}
+
+/* Scenes are read by pread, and every Gaussian in view is drawn until its pixels are full. */
+static int check_resources_of_scenes(const triptych_resources *r)
+{
+    if (r->engine != TRIPTYCH_ENGINE_AUTO && r->engine != TRIPTYCH_ENGINE_PREAD)
+        return trip_option_fail("--engine", "must be pread for Gaussian scenes");
+    if (r->read_occluded)
+        return trip_option_fail("--occluded", "does not apply to Gaussian scenes");
+    return 0;
+}
+
+int draw_settings_check_kind(const draw_settings *s, const triptych_resources *r, draw_kind kind)
+{
+    const uint64_t given = given_rows(s);
+    const struct choice *choice = kind ? find_choice_not_of_scenes(s) : NULL;
     const struct rule of_kind = {
-        .given = is_volume ? of_scenes : ~(of_scenes | of_both | of_kind_too),
-        .why = is_volume                 ? "applies to Gaussian scenes only"
+        .given =
+            !kind ? of_scenes : ~(of_scenes | of_both | (kind == DRAW_KIND_CLOUD ? of_clouds : 0)),
+        .why = !kind                     ? "applies to Gaussian scenes only"
                : kind == DRAW_KIND_CLOUD ? "does not apply to clouds of points"
                                          : "does not apply to Gaussian scenes",
     };
-    return of_kind.given & given_rows(s) ? fail_rule(&of_kind, given_rows(s)) : 0;
+    const struct rule of_layers = {
+        .given = ~rows_of_kind(s, kind),
+        .why = "does not apply to scenes with --order depth, which have nothing to merge",
+    };
+    if (of_kind.given & given)
+        return fail_rule(&of_kind, given);
+    if (choice) {
+        char option[64];
+        snprintf(option, sizeof option, "--%s", draw_settings_table.rows[choice->row].name);
+        return trip_option_fail(option, choice->why);
+    }
+    if (of_layers.given & given)
+        return fail_rule(&of_layers, given);
+    if (kind && s->clip.box && s->clip.box_of_voxels)
+        return trip_option_fail("--clip-box", "voxels: does not apply to Gaussian scenes");
+    return kind ? check_resources_of_scenes(r) : 0;
+}
+
+void draw_settings_drop_kind(draw_settings *s, int kind)
+{
+    const struct choice *choice;
+    while (kind && (choice = find_choice_not_of_scenes(s)))
+        draw_settings_unset(s, choice->row);
+    for (int i = 0; i < DRAW_OPTIONS; i++)
+        if (!draw_settings_applies(s, i, kind))
+            draw_settings_unset(s, i);
+    if (kind && s->clip.box_of_voxels)
+        draw_settings_unset(s, DRAW_CLIP_BOX);
 }
 
 void draw_settings_drop_excluded(draw_settings *s, triptych_renderer renderer)

@@ -89,7 +89,8 @@ static const char *name_of(const triptych *t, const triptych_conversion *c)
 
 static int check(const triptych *t, const triptych_conversion *c)
 {
-    int status = t->scene ? trip_context_check_volume(t) : trip_context_check_idle(t, false);
+    int status = trip_context_draws_scene(t) ? trip_context_check_volume(t)
+                                             : trip_context_check_idle(t, false);
     bool known = c->form >= TRIPTYCH_FORM_TF && c->form <= TRIPTYCH_FORM_VTK;
     if (!status && !known)
         return trip_fail(TRIP_USAGE, "tf", name_of(t, c), "unknown format");

@@ -174,6 +174,8 @@ static const char *fault_of_options(const triptych_brick_options *o)
         return "unknown kind of normals";
     if (o->levels_for < TRIPTYCH_LEVELS_FOR_AUTO || o->levels_for > TRIPTYCH_LEVELS_FOR_BOTH)
         return "coarse levels must be for post, pre or both";
+    if (o->harmonics)
+        return "stored harmonics apply to Gaussian scenes only";
     if (o->no_halo &&
         (o->levels_for == TRIPTYCH_LEVELS_FOR_POST || o->levels_for == TRIPTYCH_LEVELS_FOR_BOTH))
         return "coarse levels for post require the halo";
@@ -285,7 +287,7 @@ static void show_bytes(void *user, uint64_t done, uint64_t total)
 }
 
 /* Raise this with every change that makes the same scene give another data set. */
-enum { GAUSSIAN_BRICKER_VERSION = 1, POINT_BRICKER_VERSION = 1 };
+enum { GAUSSIAN_BRICKER_VERSION = 2, POINT_BRICKER_VERSION = 1 };
 
 static int describe_scene_form(const trip_brick_params *params, char **text)
 {

@@ -105,6 +105,7 @@ void trip_context_show_stage(void *user, const char *stage, uint64_t done, uint6
 void triptych_cancel(triptych *t)
 {
     trip_scope_cancel(&t->scope);
+    trip_context_cancel_mixed(t);
 }
 
 trip_scope *trip_context_enter(triptych *t)
@@ -248,6 +249,7 @@ static void close_data(triptych *t)
     trip_context_drop_level(t);
     trip_context_drop_heat(t);
     trip_context_close_scene(t);
+    trip_context_close_mixed(t);
     session_close(&t->session);
     free(t->name);
     t->name = NULL;
@@ -282,8 +284,23 @@ static int check_resources(const triptych_resources *r)
     return known ? 0 : trip_fail(TRIP_USAGE, "render", "resources", "unknown renderer or engine");
 }
 
-int triptych_open(triptych *t, const char *path, const triptych_resources *resources)
+/* Returns whether the objects are more than scenes and one volume that stays where it is. */
+static bool places_volumes(const triptych_object *objects, unsigned count)
 {
+    static const triptych_object unplaced = { .matrix = TRIPTYCH_UNPLACED };
+    const bool placed =
+        count > 1 || memcmp(objects->matrix, unplaced.matrix, sizeof unplaced.matrix) != 0;
+    bool volumes = false;
+    for (unsigned i = 0; i < count; i++)
+        volumes |= !trip_gaussian_set_is(objects[i].path);
+    return volumes && placed;
+}
+
+/* Opens one volume, or one or more objects. */
+static int open_objects(triptych *t, const triptych_object *objects, unsigned count,
+                        const triptych_resources *resources)
+{
+    const char *path = objects->path;
     trip_scope *before = trip_context_enter_anew(t);
     const triptych_resources wanted = resources ? *resources : (triptych_resources){ 0 };
     int status = trip_context_check_idle(t, false);
@@ -299,8 +316,10 @@ int triptych_open(triptych *t, const char *path, const triptych_resources *resou
     t->choices_read = 0;
     if (!t->name)
         status = trip_fail(TRIP_ERROR, "render", path, "out of memory");
-    else if (trip_gaussian_set_is(path))
-        status = trip_context_open_scene(t, path, wanted.memory_bytes);
+    else if (places_volumes(objects, count))
+        status = trip_context_open_mixed(t, objects, count, wanted.memory_bytes);
+    else if (count > 1 || trip_gaussian_set_is(path))
+        status = trip_context_open_scenes(t, objects, count, wanted.memory_bytes);
     else
         status = session_open_data(&t->session, path, wanted.memory_bytes);
     t->open = status == 0;
@@ -309,6 +328,24 @@ int triptych_open(triptych *t, const char *path, const triptych_resources *resou
     t->session.input = t->name;
     t->resources.name = t->resources.choices_folder = NULL;
     return trip_context_leave(before, status);
+}
+
+int triptych_open(triptych *t, const char *path, const triptych_resources *resources)
+{
+    return open_objects(t, &(triptych_object){ .path = path, .matrix = TRIPTYCH_UNPLACED }, 1,
+                        resources);
+}
+
+int triptych_open_objects(triptych *t, const triptych_object *objects, unsigned count,
+                          const triptych_resources *resources)
+{
+    trip_scope *before = trip_context_enter_anew(t);
+    int status = trip_context_check_idle(t, false);
+    if (!status && (count < 1 || count > TRIPTYCH_OBJECTS_MAX))
+        status = trip_fail(TRIP_USAGE, "render", "objects", "must be 1 to %d, not %u",
+                           TRIPTYCH_OBJECTS_MAX, count);
+    trip_context_leave(before, status);
+    return status ? status : open_objects(t, objects, count, resources);
 }
 
 int triptych_add(triptych *t, const char *path)
@@ -497,7 +534,6 @@ int triptych_verify(triptych *t)
     trip_scope *before = trip_context_enter_anew(t);
     int status = trip_context_check_idle(t, true);
     if (!status)
-        status = t->scene ? trip_gaussian_set_verify(t->scene, t->session.budget)
-                          : verify_parts(&t->session);
+        status = t->scene ? trip_context_verify_scenes(t) : verify_parts(&t->session);
     return trip_context_leave(before, status);
 }

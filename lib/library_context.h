@@ -45,9 +45,16 @@ struct triptych {
 
     triptych_resources resources;
     char *name;
-    session session;                         /* of a scene: the budget and the name alone */
-    struct trip_gaussian_set *scene;         /* NULL: the data set is a volume */
+    session session;                 /* of a scene: the budget and the name alone */
+    struct trip_gaussian_set *scene; /* the first one; NULL: the data set is a volume */
+    struct trip_placed_set *placed;  /* all scenes of the picture */
+    unsigned placed_count;
+    uint64_t *placed_drawn;                  /* Gaussians of each, in the begun frame */
+    struct trip_mixed *mixed;                /* volumes beside scenes; NULL: none */
     struct trip_gaussian_frame *scene_frame; /* the begun frame of a scene */
+    trip_renderer *device_renderer;          /* composites the scene (gl); NULL: `renderer` does */
+    bool scene_done;                         /* scene_frame is complete */
+    bool lit;                                /* light shades the surfels of the frame */
     double scene_opacity;                    /* factor of the optical depth; 0 means 1 */
     double begun_ms;                         /* when scene_frame was begun */
     bool open, has_function;
@@ -100,6 +107,7 @@ struct triptych {
     double trial_ms;          /* time of the trial for the begun frame; 0 without one */
     char no_trial[512];       /* why the trial failed; empty if it did not */
 
+    trip_clip cut; /* further half-spaces in world space, beside the clip of the settings */
     bool has_view;
     trip_camera_params view, turned;
     trip_vec3 axis;      /* axis of triptych_turn() */
@@ -183,15 +191,40 @@ void trip_context_drop_stats(triptych *t);
 /* Gaussian scenes (library_scene.c): like the functions for volumes, inside the context's scope. */
 /* Finds the files of a volume or of a Gaussian scene. */
 int trip_context_find_files(trip_source *s, const char *path, const trip_volume_params *params);
-int trip_context_open_scene(triptych *t, const char *path, uint64_t memory_bytes);
+int trip_context_open_scenes(triptych *t, const triptych_object *objects, unsigned count,
+                             uint64_t memory_bytes);
 void trip_context_close_scene(triptych *t);
+/* Returns whether library_scene.c draws the frames: of Gaussian scenes, or of several objects.
+ */
+static inline bool trip_context_draws_scene(const triptych *t)
+{
+    return t->scene || t->mixed;
+}
+int trip_context_verify_scenes(const triptych *t);
 /* Fails with TRIP_USAGE (reported) unless a volume is open. */
 int trip_context_check_volume(const triptych *t);
 trip_view_object trip_context_scene_object(const triptych *t);
 int trip_context_begin_scene(triptych *t);
+int trip_context_step_scene(triptych *t, uint64_t deadline_ns);
 int trip_context_take_scene(triptych *t, float *rgba, float *depth);
 void trip_context_end_scene(triptych *t);
 void trip_context_explain_scene(const triptych *t, FILE *out);
+
+/* Volumes beside Gaussian scenes (library_mixed.c). */
+/* Opens the objects that are volumes; the others are opened as scenes. */
+int trip_context_open_mixed(triptych *t, const triptych_object *objects, unsigned count,
+                            uint64_t memory_bytes);
+void trip_context_close_mixed(triptych *t);
+void trip_context_cancel_mixed(triptych *t);
+int trip_context_use_mixed_function(triptych *t, const triptych_transfer_function *f);
+/* Adds the volumes to a box. The first object sets the directions. */
+void trip_context_add_mixed(const triptych *t, trip_view_object *object);
+int trip_context_begin_mixed(triptych *t, int side);
+int trip_context_step_mixed(triptych *t, uint64_t deadline_ns);
+int trip_context_take_mixed(triptych *t, float *rgba);
+void trip_context_end_mixed(triptych *t);
+void trip_context_add_mixed_stats(const triptych *t, triptych_frame_stats *stats);
+void trip_context_explain_mixed(const triptych *t, FILE *out);
 /* Averages each square of `side` x `side` pixels of `fine`. */
 void trip_context_take_means(const float *fine, int side, int width, int height, float *rgba);
 

@@ -141,7 +141,7 @@ static int read_some(void *user, trip_gaussian *out, size_t room, size_t *got)
 
 static void show_passed(void *user, uint64_t passed)
 {
-    enum { PASSES = 4 };
+    enum { PASSES = 6 };
     const bricking *b = user;
     const uint64_t all = PASSES * trip_gaussian_file_info(b->file)->count;
     if (b->t->show)
@@ -178,6 +178,7 @@ static int brick(bricking *b, const char *path, const char *data_set,
         .source_user = b,
         .source_name = path,
         .degree = info->degree,
+        .harmonics = (trip_brick_harmonics)options->harmonics,
         .flags = (info->antialiased ? TRIP_GAUSSIAN_ANTIALIASED : 0) |
                  (info->flat ? TRIP_GAUSSIAN_FLAT : 0) |
                  (!strcmp(info->up, "-y") ? TRIP_GAUSSIAN_Y_DOWN : 0),
@@ -188,6 +189,9 @@ static int brick(bricking *b, const char *path, const char *data_set,
     trip_brick_gaussians_result made;
     int status = trip_brick_gaussians(&params, budget, &made);
     b->seen.count = status ? 0 : made.records;
+    b->seen.coarse = made.coarse;
+    b->seen.palette = made.palette;
+    b->seen.palette_error = made.palette_error;
     b->seen.left_out = trip_gaussian_file_left_out(b->file);
     free(notes);
     return status;
@@ -205,7 +209,10 @@ int triptych_brick_gaussians(triptych *t, const char *path, const char *data_set
         return trip_context_leave(before, trip_context_brick_points(t, path, data_set, o, out));
     int status = trip_context_check_no_points(path, o);
     if (!status)
-        status = trip_gaussian_file_open(path, &b.file);
+        status = o->harmonics < TRIPTYCH_STORED_HARMONICS_AUTO ||
+                         o->harmonics > TRIPTYCH_STORED_HARMONICS_WHOLE
+                     ? trip_fail(TRIP_USAGE, "brick", path, "unknown kind of stored harmonics")
+                     : trip_gaussian_file_open(path, &b.file);
     if (!status)
         status = trip_budget_create(&budget, o->memory_bytes);
     if (!status) {

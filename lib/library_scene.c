@@ -1,5 +1,6 @@
 /* Gaussian scenes: opening, views and frames (triptych.h). */
 #include <float.h>
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -10,29 +11,145 @@
 #include "gaussian_set.h"
 #include "library_context.h"
 #include "normalise.h"
+#include "placed_stream.h"
 #include "report.h"
+#include "scene_file.h"
 #include "shade.h"
 
-int trip_context_open_scene(triptych *t, const char *path, uint64_t memory_bytes)
+static const char *name_of(const triptych_object *o)
+{
+    return o->name ? o->name : o->path;
+}
+
+/* Opens the set of object `i`, unless an earlier object has the same path. */
+static int open_set(triptych *t, const triptych_object *objects, unsigned i)
+{
+    trip_gaussian_set *set = NULL;
+    int status = 0;
+    for (unsigned k = 0; k < i && !t->placed[i].set; k++)
+        if (!strcmp(objects[k].path, objects[i].path))
+            t->placed[i].set = t->placed[k].set;
+    if (!t->placed[i].set) {
+        status = trip_gaussian_set_open(&set, objects[i].path, t->session.budget);
+        t->placed[i].set = status ? NULL : set;
+    }
+    if (i == 0)
+        t->scene = set;
+    return status;
+}
+
+static int place_set(trip_placed_set *p, const triptych_object *o)
+{
+    return trip_gaussian_transform_make(&p->placement, o->matrix) && p->placement.even
+               ? 0
+               : trip_fail(TRIP_USAGE, "render", name_of(o),
+                           "is a Gaussian scene: its matrix must move, turn and scale it evenly, "
+                           "without mirroring");
+}
+
+int trip_context_open_scenes(triptych *t, const triptych_object *objects, unsigned count,
+                             uint64_t memory_bytes)
 {
     t->session = (session){ .input = t->name };
     int status = trip_budget_create(&t->session.budget, memory_bytes);
-    return status ? status : trip_gaussian_set_open(&t->scene, path, t->session.budget);
+    t->placed = status ? NULL : calloc(count + 1, sizeof *t->placed);
+    t->placed_drawn = status ? NULL : calloc(count + 1, sizeof *t->placed_drawn);
+    if (!status && (!t->placed || !t->placed_drawn))
+        status = trip_fail(TRIP_ERROR, "render", t->name, "out of memory");
+    for (unsigned i = 0; i < count && !status; i++) {
+        t->placed_count = i + 1;
+        status = place_set(&t->placed[i], &objects[i]);
+        if (!status)
+            status = open_set(t, objects, i);
+    }
+    return status;
+}
+
+/* Whether an earlier object has the same set. */
+static bool is_shared(const triptych *t, unsigned i)
+{
+    bool shared = false;
+    for (unsigned k = 0; k < i; k++)
+        shared |= t->placed[k].set == t->placed[i].set;
+    return shared;
 }
 
 void trip_context_close_scene(triptych *t)
 {
     trip_context_end_scene(t);
-    trip_gaussian_set_close(t->scene);
+    for (unsigned i = t->placed_count; i > 0; i--)
+        if (t->placed[i - 1].set && !is_shared(t, i - 1))
+            trip_gaussian_set_close(t->placed[i - 1].set);
+    free(t->placed);
+    free(t->placed_drawn);
+    t->placed = NULL;
+    t->placed_drawn = NULL;
+    t->placed_count = 0;
     t->scene = NULL;
+}
+
+int trip_context_verify_scenes(const triptych *t)
+{
+    int status = 0;
+    for (unsigned i = 0; i < t->placed_count && !status; i++)
+        if (!is_shared(t, i))
+            status = trip_gaussian_set_verify(t->placed[i].set, t->session.budget);
+    return status;
+}
+
+unsigned triptych_get_objects(const triptych *t, const uint64_t **drawn)
+{
+    if (drawn)
+        *drawn = t->placed_drawn;
+    return t->placed_count;
 }
 
 int trip_context_check_volume(const triptych *t)
 {
     int status = trip_context_check_open(t);
-    return !status && t->scene ? trip_fail(TRIP_USAGE, "render", t->name,
-                                           "is a Gaussian scene; this applies to volumes only")
-                               : status;
+    return !status && trip_context_draws_scene(t)
+               ? trip_fail(TRIP_USAGE, "render", t->name,
+                           "is a Gaussian scene; this applies to volumes only")
+               : status;
+}
+
+/* Adds the corners of a placed box to bounds. */
+static void add_box(const trip_gaussian_transform *t, const double from_lo[3],
+                    const double from_hi[3], double lo[3], double hi[3])
+{
+    for (int i = 0; i < 8; i++)
+        for (int a = 0; a < 3; a++) {
+            double at = t->m[a][3];
+            for (int k = 0; k < 3; k++)
+                at += t->m[a][k] * (i >> k & 1 ? from_hi[k] : from_lo[k]);
+            if (t->identity) /* exact */
+                at = i >> a & 1 ? from_hi[a] : from_lo[a];
+            lo[a] = fmin(lo[a], at);
+            hi[a] = fmax(hi[a], at);
+        }
+}
+
+/* Adds a scene to the description of all. */
+static void add_to_scene(const triptych *t, unsigned i, triptych_scene *out)
+{
+    const trip_placed_set *p = &t->placed[i];
+    const trip_file_gaussian_header *h = &p->set->header;
+    for (int a = 0; a < 3 && !i; a++) {
+        out->lo[a] = out->typical_lo[a] = INFINITY;
+        out->hi[a] = out->typical_hi[a] = -INFINITY;
+    }
+    add_box(&p->placement, h->centre_lo, h->centre_hi, out->lo, out->hi);
+    add_box(&p->placement, h->typical_lo, h->typical_hi, out->typical_lo, out->typical_hi);
+    out->gaussians += h->records;
+    out->coarse += h->list_records - h->records;
+    out->degree = (int)h->degree > out->degree ? (int)h->degree : out->degree;
+    out->antialiased &= (h->flags & TRIP_GAUSSIAN_ANTIALIASED) != 0;
+    out->flat &= (h->flags & TRIP_GAUSSIAN_FLAT) != 0;
+    if (is_shared(t, i))
+        return;
+    out->bytes += p->set->bytes;
+    for (int a = 0; a < 3; a++)
+        out->bricks += h->brick_count[a];
 }
 
 int triptych_get_scene(triptych *t, triptych_scene *out)
@@ -40,34 +157,24 @@ int triptych_get_scene(triptych *t, triptych_scene *out)
     trip_scope *before = trip_context_enter(t);
     int status = trip_context_check_open(t);
     *out = (triptych_scene){ 0 };
-    if (!status && !t->scene)
+    if (!status && (!t->scene || t->mixed))
         status = trip_fail(TRIP_USAGE, "render", t->name, "is not a Gaussian scene");
     if (status)
         return trip_context_leave(before, status);
-    const trip_file_gaussian_header *h = &t->scene->header;
-    *out = (triptych_scene){
-        .gaussians = h->records,
-        .degree = (int)h->degree,
-        .antialiased = h->flags & TRIP_GAUSSIAN_ANTIALIASED,
-        .flat = (h->flags & TRIP_GAUSSIAN_FLAT) != 0,
-        .y_down = (h->flags & TRIP_GAUSSIAN_Y_DOWN) != 0,
-        .z_up = (h->flags & TRIP_GAUSSIAN_Z_UP) != 0,
-        .bytes = t->scene->bytes,
-        .notes = t->scene->text,
-    };
-    for (int a = 0; a < 3; a++) {
-        out->lo[a] = h->centre_lo[a];
-        out->hi[a] = h->centre_hi[a];
-        out->typical_lo[a] = h->typical_lo[a];
-        out->typical_hi[a] = h->typical_hi[a];
-        out->bricks += h->brick_count[a];
-    }
+    *out = (triptych_scene){ .antialiased = 1, .flat = 1, .notes = t->scene->text };
+    out->y_down = (t->scene->header.flags & TRIP_GAUSSIAN_Y_DOWN) != 0;
+    out->z_up = (t->scene->header.flags & TRIP_GAUSSIAN_Z_UP) != 0;
+    for (unsigned i = 0; i < t->placed_count; i++)
+        add_to_scene(t, i, out);
+    const trip_view_object object = trip_context_scene_object(t);
+    memcpy(out->typical_lo, object.lo, sizeof object.lo);
+    memcpy(out->typical_hi, object.hi, sizeof object.hi);
     return trip_context_leave(before, 0);
 }
 
 int triptych_is_scene(const triptych *t)
 {
-    return t->scene != NULL;
+    return trip_context_draws_scene(t);
 }
 
 /* ---- views ---- */
@@ -76,9 +183,33 @@ int triptych_is_scene(const triptych *t)
  * then fits the whole cloud. */
 #define CLOUD_EXTENT 2
 
+static bool is_without_strays(const trip_file_gaussian_header *h)
+{
+    bool near = (h->flags & TRIP_GAUSSIAN_CLOUD) != 0;
+    for (int a = 0; a < 3; a++)
+        near &= h->centre_hi[a] - h->centre_lo[a] <=
+                CLOUD_EXTENT * (h->typical_hi[a] - h->typical_lo[a]);
+    return near;
+}
+
+/* Sets the box of all scenes: of most centres, or of everything that the Gaussians reach. */
+static void add_scenes(const triptych *t, bool reach, trip_view_object *o)
+{
+    for (int a = 0; a < 3; a++) {
+        o->lo[a] = INFINITY;
+        o->hi[a] = -INFINITY;
+    }
+    for (unsigned i = 0; i < t->placed_count; i++) {
+        const trip_file_gaussian_header *of = &t->placed[i].set->header;
+        const bool whole = reach || is_without_strays(of);
+        add_box(&t->placed[i].placement, whole ? of->reach_lo : of->typical_lo,
+                whole ? of->reach_hi : of->typical_hi, o->lo, o->hi);
+    }
+}
+
 trip_view_object trip_context_scene_object(const triptych *t)
 {
-    const trip_file_gaussian_header *h = &t->scene->header;
+    const trip_file_gaussian_header none = { 0 }, *h = t->scene ? &t->scene->header : &none;
     trip_view_object o = { .index_to_world = trip_affine_identity() };
     const bool y_down = h->flags & TRIP_GAUSSIAN_Y_DOWN;
     o.up = y_down ? trip_v3(0, -1, 0) : trip_v3(0, 1, 0);
@@ -87,35 +218,80 @@ trip_view_object trip_context_scene_object(const triptych *t)
         o.up = trip_v3(0, 0, 1);
         o.front = trip_v3(0, -1, 0);
     }
-    bool whole = true, near = (h->flags & TRIP_GAUSSIAN_CLOUD) != 0;
-    for (int a = 0; a < 3; a++) {
-        const double typical = h->typical_hi[a] - h->typical_lo[a];
-        whole &= !(typical > 0);
-        near &= h->centre_hi[a] - h->centre_lo[a] <= CLOUD_EXTENT * typical;
-    }
-    for (int a = 0; a < 3; a++) {
-        o.lo[a] = whole || near ? h->reach_lo[a] : h->typical_lo[a];
-        o.hi[a] = whole || near ? h->reach_hi[a] : h->typical_hi[a];
-    }
+    add_scenes(t, false, &o);
+    if (!t->mixed && o.lo[0] >= o.hi[0] && o.lo[1] >= o.hi[1] && o.lo[2] >= o.hi[2])
+        add_scenes(t, true, &o); /* the centres are one point */
+    if (t->mixed)
+        trip_context_add_mixed(t, &o);
     return o;
 }
 
 /* ---- frames ---- */
 
-static int check(const triptych *t, bool *reference)
+/* Gaussians wider than a pixel are drawn as they are. */
+#define DEFAULT_LOD_PX 1.0
+
+static bool has_lists(const triptych *t)
 {
-    const triptych_renderer r = t->resources.renderer;
-    *reference = r == TRIPTYCH_RENDERER_REFERENCE;
-    if (r == TRIPTYCH_RENDERER_GL || r == TRIPTYCH_RENDERER_INTEGRAL)
-        return trip_fail(TRIP_USAGE, "render", t->name,
-                         "is a Gaussian scene; use --renderer cpu or reference");
-    if (t->given.splat.footprint == TRIPTYCH_FOOTPRINT_FIXED)
-        return trip_option_fail("--kernel", "fixed does not apply to Gaussian scenes");
-    if (t->given.all.method == TRIPTYCH_METHOD_IMAGE)
-        return trip_option_fail("--method", "image does not apply to Gaussian scenes");
-    return draw_settings_check_kind(&t->given, t->scene->header.flags & TRIP_GAUSSIAN_CLOUD
-                                                   ? DRAW_KIND_CLOUD
-                                                   : DRAW_KIND_SCENE);
+    return t->given.scene.order >= TRIPTYCH_ORDER_LISTS;
+}
+
+/* Returns half the diagonal of the typical bounds, or of one Gaussian. */
+static double radius_of(const triptych *t)
+{
+    const trip_view_object o = trip_context_scene_object(t);
+    double sum = 0;
+    for (int a = 0; a < 3; a++)
+        sum += (o.hi[a] - o.lo[a]) * (o.hi[a] - o.lo[a]);
+    return sum > 0 ? sqrt(sum) / 2 : 1;
+}
+
+/* Returns the thickness of the sheets, or 0 for other orders. */
+static double sheet_of(const triptych *t)
+{
+    enum { SHEETS_IN_RADIUS = 1024 };
+    if (t->given.scene.order != TRIPTYCH_ORDER_SHEETS)
+        return 0;
+    return t->given.scene.sheet > 0 ? t->given.scene.sheet : radius_of(t) / SHEETS_IN_RADIUS;
+}
+
+/* So thin sheets would take hours and show nothing more. */
+static int check_sheet(const triptych *t)
+{
+    enum { SHEETS_MAX = 1 << 17 };
+    const double least = radius_of(t) / SHEETS_MAX, sheet = sheet_of(t);
+    return sheet > 0 && sheet < least
+               ? trip_fail(TRIP_USAGE, "usage", "--sheet",
+                           "%g is too thin for this scene; give at least %.3g", sheet, least)
+               : 0;
+}
+
+static int check_sheets(const triptych *t)
+{
+    const bool one = t->placed_count == 1 && t->placed->placement.identity && !t->mixed;
+    return one || t->given.scene.order != TRIPTYCH_ORDER_SHEETS
+               ? check_sheet(t)
+               : trip_option_fail("--order", "sheets draws one scene alone, where it lies");
+}
+
+/* Clouds alone have light. */
+static draw_kind kind_of(const triptych *t)
+{
+    bool clouds = true;
+    for (unsigned i = 0; i < t->placed_count; i++)
+        clouds &= (t->placed[i].set->header.flags & TRIP_GAUSSIAN_CLOUD) != 0;
+    return clouds && !t->mixed ? DRAW_KIND_CLOUD : DRAW_KIND_SCENE;
+}
+
+static int check(const triptych *t)
+{
+    triptych_renderer r = t->resources.renderer;
+    if (t->mixed) /* some settings are for its volumes */
+        return check_sheets(t);
+    if (r == TRIPTYCH_RENDERER_INTEGRAL && draw_settings_check(&t->given, &r, false))
+        return TRIP_USAGE;
+    const int status = draw_settings_check_kind(&t->given, &t->resources, kind_of(t));
+    return status ? status : check_sheets(t);
 }
 
 static int make_camera(triptych *t, int side)
@@ -134,38 +310,56 @@ static trip_gaussian_shape shape_of(triptych_footprint footprint)
                                                  : TRIP_GAUSSIAN_PROJECTED;
 }
 
+/* Returns the highest degree of the scenes. */
+static int degree_of(const triptych *t)
+{
+    int degree = 0;
+    for (unsigned i = 0; i < t->placed_count; i++) {
+        const int own = (int)t->placed[i].set->header.degree;
+        degree = own > degree ? own : degree;
+    }
+    return degree;
+}
+
 static trip_gaussian_settings settings_of(const triptych *t)
 {
     const draw_settings *g = &t->given;
     trip_gaussian_settings out = {
         .degree = g->scene.harmonics ? (int)g->scene.harmonics - 1 : TRIP_SH_DEGREE_MAX,
-        .antialiased = t->scene->header.flags & TRIP_GAUSSIAN_ANTIALIASED,
+        .antialiased = true,
         .shape = shape_of(g->splat.footprint),
         .opacity_scale = t->scene_opacity,
         .early_termination = g->all.early_termination == TRIPTYCH_ZERO ? DBL_MIN /* never */
                                                                        : g->all.early_termination,
         .clip = trip_context_clip(t),
-        .depth = g->all.depth,
+        .light = t->lit ? &t->drawn_settings : NULL,
+        .depth = g->all.depth || t->mixed,
     };
-    if (out.degree > (int)t->scene->header.degree)
-        out.degree = (int)t->scene->header.degree;
-    memcpy(out.background, t->settings.background, sizeof out.background);
+    for (unsigned i = 0; i < t->placed_count; i++)
+        out.antialiased &= (t->placed[i].set->header.flags & TRIP_GAUSSIAN_ANTIALIASED) != 0;
+    if (out.degree > degree_of(t))
+        out.degree = degree_of(t);
+    if (!t->mixed) /* it comes behind everything */
+        memcpy(out.background, t->settings.background, sizeof out.background);
     return out;
 }
 
 /* Sets the light on surfels. Colours of a camera have a light of their own, and get another only if
  * one is given. */
-static bool choose_light(triptych *t)
+static int choose_light(triptych *t)
 {
-    const uint32_t flags = t->scene->header.flags;
     const triptych_light *given = &t->given.light;
+    const trip_affine identity = trip_affine_identity();
     trip_settings *s = &t->drawn_settings;
+    bool lit = given->kind != TRIPTYCH_LIGHT_DEFAULT;
+    for (unsigned i = 0; i < t->placed_count; i++)
+        lit |= (t->placed[i].set->header.flags & TRIP_GAUSSIAN_SHADED) != 0;
+    t->lit = lit && s->shading && kind_of(t) == DRAW_KIND_CLOUD;
     if (given->kind == TRIPTYCH_LIGHT_VIEW)
         s->light_direction = trip_normalize(trip_camera_direction(
             &t->camera, given->toward[0], given->toward[1], given->toward[2]));
     s->headlight &= given->kind != TRIPTYCH_LIGHT_VIEW;
-    return flags & TRIP_GAUSSIAN_CLOUD && s->shading &&
-           (flags & TRIP_GAUSSIAN_SHADED || given->kind != TRIPTYCH_LIGHT_DEFAULT);
+    return t->lit ? trip_light_check(s, &identity) : 0;
 }
 
 /* Takes the picture of several rays per pixel. */
@@ -184,17 +378,47 @@ static int take_fine(triptych *t, int side)
                      side);
 }
 
+static bool draws_by_gl(const triptych *t)
+{
+    return t->resources.renderer == TRIPTYCH_RENDERER_GL;
+}
+
+/* Makes the renderer that lends its device, if the scene needs one. */
+static int make_device(triptych *t)
+{
+    return !draws_by_gl(t) || t->device_renderer
+               ? 0
+               : trip_renderer_create(&t->device_renderer, TRIP_RENDERER_GL, t->resources.threads,
+                                      t->session.budget);
+}
+
+/* Returns the device that composites, or NULL. */
+static const trip_tile_device *device_of(const triptych *t)
+{
+    return t->device_renderer ? t->device_renderer->ops->tile_device(t->device_renderer) : NULL;
+}
+
+/* Returns the width of voxels in pixels that coarse Gaussians may stand for. */
+static double lod_of(const triptych *t)
+{
+    const double given = t->given.lod.voxel_px;
+    return given == TRIPTYCH_ZERO ? 0 : given > 0 ? given : DEFAULT_LOD_PX;
+}
+
 int trip_context_begin_scene(triptych *t)
 {
-    bool reference;
+    const triptych_renderer r = t->resources.renderer;
+    const bool integrates = r == TRIPTYCH_RENDERER_INTEGRAL;
     const int side = t->given.all.samples > 0 ? t->given.all.samples : 1;
     int status = trip_context_check_idle(t, true);
     if (!status)
-        status = check(t, &reference);
+        status = check(t);
     if (!status && !t->has_view)
         status = trip_context_find_view(t, &(triptych_view){ 0 });
     if (!status && !t->renderer) /* lends its threads */
         status = trip_cpu_create(&t->renderer, t->session.budget, t->resources.threads);
+    if (!status)
+        status = make_device(t);
     if (!status)
         status = make_camera(t, side);
     if (!status)
@@ -205,47 +429,70 @@ int trip_context_begin_scene(triptych *t)
     t->drawn_settings.classify = TRIP_CLASSIFY_PRE; /* h of splats */
     t->drawn_settings.samples = side;
     t->begun_ms = trip_now_ms();
-    const bool lit = choose_light(t);
-    const trip_affine identity = trip_affine_identity();
-    status = lit ? trip_light_check(&t->drawn_settings, &identity) : 0;
+    status = choose_light(t);
     if (status) {
         trip_context_end_scene(t);
         return status;
     }
+    memset(t->placed_drawn, 0, t->placed_count * sizeof *t->placed_drawn);
     const trip_gaussian_frame_params params = {
-        .set = t->scene,
+        .sets = t->placed,
+        .set_count = t->placed_count,
+        .drawn = t->placed_drawn,
         .camera = &t->camera,
         .settings = settings_of(t),
-        .by_lists = t->given.scene.order == TRIPTYCH_ORDER_LISTS ? &t->drawn_settings : NULL,
-        .light = lit ? &t->drawn_settings : NULL,
-        .reference = reference,
+        .lod_px = lod_of(t) * side,
+        .by_lists = has_lists(t) ? &t->drawn_settings : NULL,
+        .sheet = sheet_of(t),
+        .reference = r == TRIPTYCH_RENDERER_REFERENCE || (integrates && t->mixed),
+        .integral = integrates && !t->mixed,
+        .tolerance = t->given.integral.tolerance,
+        .device = device_of(t),
         .budget = t->session.budget,
         .runner = trip_renderer_runner(t->renderer),
     };
-    status = trip_gaussian_frame_begin(&t->scene_frame, &params);
+    status = t->scene ? trip_gaussian_frame_begin(&t->scene_frame, &params) : 0;
+    if (!status && t->mixed)
+        status = trip_context_begin_mixed(t, side);
     t->begun = t->drawn = !status;
+    t->scene_done = false;
     if (status)
         trip_context_end_scene(t);
     return status;
 }
 
+static const char *renderer_name(triptych_renderer r)
+{
+    return r == TRIPTYCH_RENDERER_REFERENCE  ? "reference"
+           : r == TRIPTYCH_RENDERER_INTEGRAL ? "integral"
+           : r == TRIPTYCH_RENDERER_GL       ? "gl"
+                                             : "cpu";
+}
+
+static trip_gaussian_frame_stats stats_of_frame(const triptych *t)
+{
+    return t->scene_frame ? trip_gaussian_frame_get_stats(t->scene_frame)
+                          : (trip_gaussian_frame_stats){ 0 };
+}
+
 static triptych_frame_stats stats_of(const triptych *t)
 {
-    const trip_gaussian_frame_stats s = trip_gaussian_frame_get_stats(t->scene_frame);
+    const trip_gaussian_frame_stats s = stats_of_frame(t);
     const trip_gaussian_settings settings = settings_of(t);
-    const bool reference = t->resources.renderer == TRIPTYCH_RENDERER_REFERENCE;
+    const triptych_renderer r = t->resources.renderer;
     return (triptych_frame_stats){
         .ms = trip_now_ms() - t->begun_ms,
         .wait_ms = s.read_ms,
         .draw_ms = s.draw_ms,
         .merge_ms = s.merge_ms,
         .splats = s.gaussians,
+        .lod_px = lod_of(t),
         .bytes_read = s.bytes_read,
         .reads = s.bricks,
         .memory_bytes = trip_budget_limit_bytes(t->session.budget),
         .peak_memory_bytes = trip_budget_peak_bytes(t->session.budget),
-        .renderer = reference ? "reference" : "cpu",
-        .device = reference ? "CPU, double precision, 1 thread" : t->device,
+        .renderer = renderer_name(r),
+        .device = r == TRIPTYCH_RENDERER_REFERENCE ? "CPU, double precision, 1 thread" : t->device,
         .engine = "pread",
         .ring = "not used: Gaussians come from windows",
         .classify = TRIPTYCH_CLASSIFY_PRE,
@@ -256,19 +503,47 @@ static triptych_frame_stats stats_of(const triptych *t)
     };
 }
 
+/* Drawing reports its progress in steps of this time. */
+enum { REPORT_NS = 50000000 };
+
+int trip_context_step_scene(triptych *t, uint64_t deadline_ns)
+{
+    int status = t->mixed ? trip_context_step_mixed(t, deadline_ns) : TRIP_FRAME_MORE;
+    while (!t->mixed && status == TRIP_FRAME_MORE) {
+        const uint64_t next_ns = trip_now_ns() + REPORT_NS;
+        const bool reports = t->show && next_ns < deadline_ns;
+        status = trip_gaussian_frame_step(t->scene_frame, reports ? next_ns : deadline_ns);
+        if (t->show && status >= 0) {
+            uint64_t all = 0;
+            for (unsigned i = 0; i < t->placed_count; i++)
+                all += t->placed[i].set->header.records;
+            const double done = trip_gaussian_frame_get_stats(t->scene_frame).done;
+            trip_context_show_stage(t, "splat", (uint64_t)(done * (double)all), all);
+        }
+        if (!reports)
+            break;
+    }
+    t->scene_done = status == TRIP_FRAME_DONE;
+    return status;
+}
+
 int trip_context_take_scene(triptych *t, float *rgba, float *depth)
 {
     const int side = t->drawn_settings.samples;
     float *picture = side > 1 ? t->before : rgba;
-    int status = trip_gaussian_frame_picture(t->scene_frame, picture, depth);
+    int status = t->mixed ? trip_context_take_mixed(t, picture)
+                          : trip_gaussian_frame_picture(t->scene_frame, picture, depth);
     if (!status && side > 1)
         trip_context_take_means(picture, side, t->turned.width, t->turned.height, rgba);
     if (!status && t->given.all.normalise)
         trip_normalise(rgba, (size_t)t->turned.width * (size_t)t->turned.height,
                        t->settings.background);
-    if (!status) {
-        snprintf(t->device, sizeof t->device, "%s", t->renderer->ops->device(t->renderer));
+    if (!status && t->scene_done) {
+        const trip_renderer *r = draws_by_gl(t) ? t->device_renderer : t->renderer;
+        snprintf(t->device, sizeof t->device, "%s", r->ops->device(r));
         t->stats = stats_of(t);
+        if (t->mixed)
+            trip_context_add_mixed_stats(t, &t->stats);
         t->has_stats = true;
     }
     return status;
@@ -278,6 +553,8 @@ void trip_context_end_scene(triptych *t)
 {
     trip_gaussian_frame_end(t->scene_frame);
     t->scene_frame = NULL;
+    if (t->mixed)
+        trip_context_end_mixed(t);
     trip_budget_release(t->session.budget, t->before, t->before_bytes);
     t->before = NULL;
     t->before_bytes = 0;
@@ -286,19 +563,56 @@ void trip_context_end_scene(triptych *t)
 
 void trip_context_explain_scene(const triptych *t, FILE *out)
 {
-    const trip_gaussian_frame_stats s = trip_gaussian_frame_get_stats(t->scene_frame);
+    const trip_gaussian_frame_stats s = stats_of_frame(t);
     const trip_gaussian_settings settings = settings_of(t);
-    const bool lists = t->given.scene.order == TRIPTYCH_ORDER_LISTS;
-    fprintf(out, "scene       %llu Gaussians, harmonics up to degree %d of %u\n",
-            (unsigned long long)t->scene->header.records, settings.degree, t->scene->header.degree);
-    if (lists)
+    const bool integral = t->resources.renderer == TRIPTYCH_RENDERER_INTEGRAL && !t->mixed;
+    for (unsigned i = 0; i < t->placed_count; i++) {
+        const trip_file_gaussian_header *h = &t->placed[i].set->header;
+        const int own = (int)h->degree;
+        fprintf(out, "scene       %llu Gaussians, harmonics up to degree %d of %d\n",
+                (unsigned long long)h->records, own < settings.degree ? own : settings.degree, own);
+    }
+    if (t->mixed)
+        trip_context_explain_mixed(t, out);
+    if (integral)
+        fprintf(out, "order       none: the integral of overlapping Gaussians along each ray\n");
+    else if (sheet_of(t) > 0)
+        fprintf(out,
+                "order       by sheets %.4g thick, in %u passes: at most %llu Gaussians meet a "
+                "sheet at a time\n",
+                sheet_of(t), s.layers, (unsigned long long)s.window_records);
+    else if (has_lists(t))
         fprintf(out, "order       by lists: %u of 3 have weight in the picture\n", s.layers);
     else
         fprintf(out, "order       by depth: at most %llu Gaussians wait in the window\n",
                 (unsigned long long)s.window_records);
+    if (lod_of(t) > 0)
+        fprintf(out, "levels      coarse Gaussians for voxels of at most %g pixels: %llu of %llu\n",
+                lod_of(t), (unsigned long long)s.coarse, (unsigned long long)s.planned);
+    else
+        fprintf(out, "levels      the Gaussians of the scene alone\n");
     fprintf(out, "footprint   %s%s\n",
             settings.shape == TRIP_GAUSSIAN_EXACT ? "exact, along each pixel's ray"
             : settings.shape == TRIP_GAUSSIAN_EWA ? "EWA, projected at the centre without limits"
                                                   : "projected at the centre, as in training",
             settings.antialiased ? "; opacity compensated for the blur of pixels" : "");
+}
+
+/* ---- scene files ---- */
+
+int triptych_is_scene_file(const char *path)
+{
+    return trip_scene_file_is(path);
+}
+
+int triptych_read_scene_file(triptych *t, const char *path, triptych_object **objects,
+                             unsigned *count)
+{
+    trip_scope *before = trip_context_enter_anew(t);
+    return trip_context_leave(before, trip_scene_file_read(path, objects, count));
+}
+
+void triptych_free_objects(triptych_object *objects, unsigned count)
+{
+    trip_scene_file_free(objects, count);
 }

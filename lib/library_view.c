@@ -74,17 +74,17 @@ int trip_context_find_view(triptych *t, const triptych_view *given)
     const trip_view_settings settings = settings_of(given);
     const session *s = &t->session;
     trip_found_view found;
-    int status = t->has_function || t->scene
+    int status = t->has_function || trip_context_draws_scene(t)
                      ? 0
                      : trip_context_use_transfer_function(t, &(triptych_transfer_function){ 0 });
     if (!status)
         status = check(&settings);
     if (status)
         return status;
-    trip_view_object object =
-        t->scene ? trip_context_scene_object(t) : trip_view_object_of(s->data, s->text);
+    trip_view_object object = trip_context_draws_scene(t) ? trip_context_scene_object(t)
+                                                          : trip_view_object_of(s->data, s->text);
     trip_visible visible = { .data = s->data, .budget = s->budget, .table = s->table };
-    if (!t->scene && !(settings.eye && settings.look) &&
+    if (!trip_context_draws_scene(t) && !(settings.eye && settings.look) &&
         !trip_coordinates_uneven(&s->data->coordinates)) {
         status = make_reader(t, &visible);
         object.visible = &visible;

@@ -61,7 +61,9 @@ int triptych_set_transfer_function(triptych *t, const triptych_transfer_function
     int status = trip_context_check_idle(t, true);
     if (!status)
         status = check_function(f);
-    if (!status && t->scene)
+    if (!status && t->mixed)
+        status = trip_context_use_mixed_function(t, f);
+    else if (!status && t->scene)
         status = use_scene_function(t, f);
     else if (!status)
         status = trip_context_use_transfer_function(t, f);
@@ -222,7 +224,7 @@ trip_clip trip_context_clip(const triptych *t)
 {
     const triptych_clip *c = &t->given.clip;
     trip_affine to_box = trip_affine_identity();
-    trip_clip clip = { 0 };
+    trip_clip clip = t->cut;
     if (c->box && c->box_of_voxels) /* the map was checked on opening */
         trip_affine_invert(&t->session.data->index_to_world, &to_box);
     if (c->box && c->box_of_voxels)

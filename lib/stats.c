@@ -68,9 +68,9 @@ int triptych_explain(triptych *t, char **text)
     *text = NULL;
     int status = t->drawn ? 0 : trip_fail(TRIP_USAGE, "render", "frame", "no frame is begun");
     FILE *f = status ? NULL : open_memstream(text, &bytes);
-    if (f && t->scene)
+    if (f && trip_context_draws_scene(t))
         trip_context_explain_scene(t, f);
-    if (f && !t->scene) {
+    if (f && !trip_context_draws_scene(t)) {
         explain_choices(t, f);
         trip_plan_explain(&t->plan, t->session.data, &t->drawn_settings, f);
         trip_context_explain_effects(t, f);

@@ -93,7 +93,7 @@ TRIPTYCH_API void triptych_set_messages(triptych *t, triptych_message_callback t
  * calling thread. NULL, the default, reports no progress. Drawing has
  * these stages; triptych_brick.h lists the stages of bricking.
  * - "draw": voxels, in post
- * - "splat": splats, in pre
+ * - "splat": splats, in pre; Gaussians, in scenes
  * - "count": splats, with triptych_settings.count_exactly
  * - "integrate": pixels, with the integral renderer */
 TRIPTYCH_API void triptych_set_progress(triptych *t, triptych_progress_callback show, void *user);
@@ -108,7 +108,8 @@ typedef enum triptych_renderer {
     TRIPTYCH_RENDERER_CPU,
     TRIPTYCH_RENDERER_REFERENCE, /* double precision, slow */
     /* The integral along each ray in double precision, which all other renderers approximate.
-     * Slowest. The whole volume must fit in memory, at 16 bytes per voxel. */
+     * Slowest. The whole volume must fit in memory, at 16 bytes per voxel. In a Gaussian scene, the
+     * Gaussians in view must fit, at 352 bytes each. */
     TRIPTYCH_RENDERER_INTEGRAL,
 } triptych_renderer;
 
@@ -209,7 +210,8 @@ TRIPTYCH_API int triptych_get_info(triptych *t, triptych_info *out);
 
 /* An open data set of a Gaussian scene. Lengths are in units of the scene. */
 typedef struct triptych_scene {
-    uint64_t gaussians, bricks; /* bricks of the three lists */
+    uint64_t gaussians, bricks; /* bricks of the three lists, all levels */
+    uint64_t coarse;            /* Gaussians of coarse levels, not in `gaussians` */
     uint64_t bytes;             /* of all files */
     int degree;                 /* of the spherical harmonics, 0 to 3 */
     int antialiased;            /* trained with opacities that make up for the blur of pixels */
@@ -217,7 +219,8 @@ typedef struct triptych_scene {
     int y_down;                 /* the scene's y axis points down */
     int z_up;                   /* the scene's z axis points up */
     double lo[3], hi[3];        /* bounds of all centres */
-    /* Bounds of the centres without the outer 1 % on each side. Views fit these. */
+    /* Bounds of the centres without the outer 1 % on each side; if these are a point, bounds of the
+     * Gaussians. Views fit these. */
     double typical_lo[3], typical_hi[3];
     const char *notes; /* JSON; belongs to the data set */
 } triptych_scene;
@@ -226,8 +229,48 @@ typedef struct triptych_scene {
  * fail with TRIPTYCH_USAGE: triptych_get_info(), triptych_get_list(), triptych_add(), and those
  * about values, heat and probes. */
 TRIPTYCH_API int triptych_is_scene(const triptych *t);
-/* Describes the open scene. Fails with TRIPTYCH_USAGE if a volume or nothing is open. */
+/* Describes the open scene. Fails with TRIPTYCH_USAGE if a volume or nothing is open. For several
+ * scenes in one picture, it sums the counts and joins the bounds, and gives the first scene's
+ * notes.
+ */
 TRIPTYCH_API int triptych_get_scene(triptych *t, triptych_scene *out);
+
+/* ---- several data sets in one picture ---- */
+
+enum { TRIPTYCH_OBJECTS_MAX = 1000 };
+
+/* A data set and its place in the picture. */
+typedef struct triptych_object {
+    const char *path;     /* of the data set */
+    const char *name;     /* in messages; NULL: the path */
+    double matrix[3][4];  /* maps the data set's space into the common space */
+    const char *function; /* file or preset of a volume; NULL: the function of the picture */
+} triptych_object;
+
+/* The matrix of an object that stays where it is. */
+#define TRIPTYCH_UNPLACED                                                                          \
+    {                                                                                              \
+        { 1, 0, 0, 0 }, { 0, 1, 0, 0 },                                                            \
+        {                                                                                          \
+            0, 0, 1, 0                                                                             \
+        }                                                                                          \
+    }
+
+/* Opens Gaussian scenes and at most 16 volumes for one picture, instead of triptych_open(). A
+ * matrix may move, turn and scale evenly. One path may occur several times, and is opened once. */
+TRIPTYCH_API int triptych_open_objects(triptych *t, const triptych_object *objects, unsigned count,
+                                       const triptych_resources *resources);
+/* Returns the number of scenes of the open picture: 0 if a volume or nothing is open. Sets *drawn
+ * to the Gaussians of each that the last frame drew; they last until the next frame. */
+TRIPTYCH_API unsigned triptych_get_objects(const triptych *t, const uint64_t **drawn);
+
+/* Returns 1 if the path names a scene file: a JSON file that places data sets. */
+TRIPTYCH_API int triptych_is_scene_file(const char *path);
+/* Reads a scene file. The path of an object is a named file, which may still need bricking. The
+ * `name` of an object is NULL. triptych_free_objects() frees the objects. */
+TRIPTYCH_API int triptych_read_scene_file(triptych *t, const char *path, triptych_object **objects,
+                                          unsigned *count);
+TRIPTYCH_API void triptych_free_objects(triptych_object *objects, unsigned count);
 
 /* A list: records of one kind along one axis at one level of detail. */
 typedef struct triptych_list {
@@ -494,7 +537,8 @@ typedef enum triptych_field {
 typedef struct triptych_integral_settings {
     triptych_field field;
     /* Bound of the error of each component of a pixel, 1e-12 to 0.1. The default is 1e-3 for the
-     * mean over the area of each pixel, and 1e-4 for a number of rays per pixel. */
+     * mean over the area of each pixel, 1e-4 for a number of rays per pixel, and 5e-5 for a
+     * Gaussian scene. */
     double tolerance;
 } triptych_integral_settings;
 
@@ -503,7 +547,8 @@ typedef struct triptych_integral_settings {
 typedef struct triptych_lod_settings {
     /* Each part of the picture is drawn at the coarsest level with voxels at most this many pixels
      * wide, up to 1000. TRIPTYCH_ZERO draws the finest level only. By default (0 or -2), post
-     * chooses by the quality, and pre draws the finest level. */
+     * chooses by the quality, and pre draws the finest level. For Gaussian scenes the default is
+     * 1. */
     double voxel_px;
     /* Bounds the bytes of codes and normals in view. The parts that are widest in the picture get
      * the finest levels first. Positions are not counted; they add 10 to 30 %. Never finer than
@@ -579,6 +624,10 @@ typedef enum triptych_order {
     /* By their coordinates along X, Y and Z. The layers of the three lists are blended. Fewer
      * Gaussians change places when the view turns. */
     TRIPTYCH_ORDER_LISTS,
+    /* In slabs of space, perpendicular to X, Y and Z. A Gaussian shares out its optical depth over
+     * the sheets that it reaches. The order inside a sheet does not matter. The picture comes close
+     * to the integral of overlapping Gaussians. Not with GL. */
+    TRIPTYCH_ORDER_SHEETS,
 } triptych_order;
 
 /* The highest degree of the spherical harmonics of a scene that are read and drawn. */
@@ -594,6 +643,9 @@ typedef enum triptych_harmonics {
 typedef struct triptych_scene_settings {
     triptych_order order;
     triptych_harmonics harmonics;
+    /* Thickness of a sheet in units of the scene; for the order by sheets. The default is a 1024th
+     * of the scene's radius, half the diagonal of its typical bounds. */
+    double sheet;
 } triptych_scene_settings;
 
 /* The settings of a picture. NULL selects the defaults of a group. */
@@ -605,7 +657,8 @@ typedef struct triptych_settings {
     triptych_interpolation interpolation;
     triptych_show show; /* not with the integral, which has no lists and no levels */
     /* Merge: weight at which layers begin to blend, 0 (TRIPTYCH_ZERO) to below 1. The default is
-     * 0.85 for pre and 0.99 for post. */
+     * 0.85 for pre and 0.99 for post. A scene drawn by depth has one layer, and refuses h and
+     * `method`. */
     double h;
     /* Transmittance below which a pixel takes no more samples or splats: 0 (TRIPTYCH_ZERO, never)
      * to 0.1. No component of a pixel changes by more than this number. The default is 1/8192 for

@@ -47,6 +47,13 @@ typedef enum triptych_normals {
 } triptych_normals;
 
 /* The classification for which coarse levels are made. */
+/* How the coefficients of spherical harmonics of degree 1 and above are stored. */
+typedef enum triptych_stored_harmonics {
+    TRIPTYCH_STORED_HARMONICS_AUTO,    /* by a palette if colours change by less than 0.5 of 255 */
+    TRIPTYCH_STORED_HARMONICS_PALETTE, /* two bytes a Gaussian: an entry of a palette */
+    TRIPTYCH_STORED_HARMONICS_WHOLE,   /* a byte a coefficient */
+} triptych_stored_harmonics;
+
 typedef enum triptych_levels_for {
     TRIPTYCH_LEVELS_FOR_AUTO, /* post, or pre if there is no halo */
     TRIPTYCH_LEVELS_FOR_POST, /* interpolated values; needs a halo */
@@ -166,9 +173,10 @@ typedef struct triptych_brick_options {
     int no_halo; /* if not 0, stores no halo */
     int levels;  /* number of coarse levels; 0: until one is a single brick; below 0: none */
     triptych_levels_for levels_for;
-    unsigned tile_voxels; /* edge of a tile: 16, 32, 64 or 128; default 64 */
-    unsigned slab_sheets; /* 1 to 64; default 8 */
-    int replace;          /* if not 0, replaces an existing data set of the same name */
+    triptych_stored_harmonics harmonics; /* of a Gaussian scene */
+    unsigned tile_voxels;                /* edge of a tile: 16, 32, 64 or 128; default 64 */
+    unsigned slab_sheets;                /* 1 to 64; default 8 */
+    int replace; /* if not 0, replaces an existing data set of the same name */
     /* If not 0, resumes an interrupted run with the same input and options, if there is one. */
     int resume;
     /* Limit of the data set's size. A larger data set is refused before it is written. 0 sets no
@@ -308,12 +316,16 @@ TRIPTYCH_API int triptych_describe(triptych *t, const char *volume,
 
 /* A Gaussian scene: splats with shapes of their own. */
 typedef struct triptych_gaussians {
-    char format[64];     /* "3DGS PLY", ... */
-    char trainer[256];   /* the program that trained or wrote it, and other comments; or "" */
-    char up[3];          /* the axis that points up: "x", "y", "z", or with a minus */
-    uint64_t count;      /* of Gaussians, without those that are left out */
-    uint64_t left_out;   /* Gaussians with a value that is not finite */
-    int degree;          /* of spherical harmonics, 0 to 3 */
+    char format[64];   /* "3DGS PLY", ... */
+    char trainer[256]; /* the program that trained or wrote it, and other comments; or "" */
+    char up[3];        /* the axis that points up: "x", "y", "z", or with a minus */
+    uint64_t count;    /* of Gaussians, without those that are left out */
+    uint64_t left_out; /* Gaussians with a value that is not finite */
+    int degree;        /* of spherical harmonics, 0 to 3 */
+    uint64_t coarse;   /* Gaussians of coarse levels; 0 before bricking, like the next two */
+    uint64_t palette;  /* entries of the palette of harmonics; 0 without one */
+    /* Mean error of colours by a palette, of 1, over all directions; 0 if none was tried. */
+    double palette_error;
     int antialiased;     /* not 0: trained with a compensated opacity */
     int flat;            /* not 0: surfels, with two deviations each */
     double lo[3], hi[3]; /* of the centres */

@@ -16,6 +16,7 @@
 struct trip_field;
 struct trip_light_map;
 struct trip_emission;
+struct trip_tile_device;
 
 /* Counts of one list in one frame. Splats near the eye's coordinate that belong to both passes
  * (plan.h) count once per pass. `post` projects no splats and counts 0. */
@@ -132,6 +133,9 @@ typedef struct trip_renderer_ops {
      * the runner's user pointer. NULL if the renderer has no threads. */
     void (*run_tasks)(void *renderer, void (*task)(void *context, unsigned number), void *context,
                       unsigned count);
+    /* Returns the device that composites the tiles of Gaussian scenes (gaussian_tiles.h). The
+     * renderer owns it. NULL if the renderer has none. */
+    const struct trip_tile_device *(*tile_device)(trip_renderer *r);
     /* Returns the counts of a list, by its index in the data set, after picture(). The caller
      * counts bytes_read. */
     trip_list_stats (*stats)(const trip_renderer *r, unsigned list);

@@ -8,11 +8,13 @@
 #include <string.h>
 #include <time.h>
 
+#include "clipping.h"
 #include "clock.h"
 #include "encode.h"
 #include "json.h"
 #include "light.h"
 #include "report.h"
+#include "scene.h"
 #include "script.h"
 #include "text.h"
 #include "viewer.h"
@@ -211,10 +213,13 @@ bool trip_session_set_function(trip_session *s, const char *name)
     if (*name && !known)
         return false;
     pthread_mutex_lock(&s->lock);
-    trip_viewer_set_function(&s->viewer, known);
+    const trip_document *d = trip_viewer_document(&s->viewer);
+    const bool applies = d && !d->is_scene;
+    if (applies)
+        trip_viewer_set_function(&s->viewer, known);
     trip_viewer_tick(&s->viewer, 0);
     pthread_mutex_unlock(&s->lock);
-    return true;
+    return applies;
 }
 
 static bool choose(const char *text, const char *const *names, int *out)
@@ -266,14 +271,27 @@ static bool set_number(double *out, const char *value, double lo, double hi)
     return true;
 }
 
+/* Returns whether a setting applies to the data. Before they are open, it is left out later. */
+static bool applies(const trip_document *d, const char *name, const draw_settings *s)
+{
+    draw_settings kept = *s;
+    bool all = true;
+    draw_settings_drop_kind(&kept, d->is_scene);
+    for (int i = 0; i < DRAW_OPTIONS; i++) {
+        const trip_option *row = &draw_settings_table.rows[i];
+        all &= strcmp(row->name, name) || trip_option_same(row, &kept, s);
+    }
+    return all || !d->opened;
+}
+
 /* Sets a setting by its option. An empty value selects the default. */
-static bool set_setting(draw_settings *s, const char *name, const char *value)
+static bool set_setting(trip_document *d, const char *name, const char *value)
 {
     trip_scope quiet = { .sink = trip_report_discard }, *before = trip_scope_enter(&quiet);
     uint64_t given = 0;
     bool known = false;
     int status = 0;
-    draw_settings next = *s;
+    draw_settings next = d->settings;
     for (int i = 0; i < DRAW_OPTIONS; i++)
         if (!strcmp(draw_settings_table.rows[i].name, name)) {
             draw_settings_unset(&next, i);
@@ -282,9 +300,11 @@ static bool set_setting(draw_settings *s, const char *name, const char *value)
     if (known && *value)
         status = trip_option_read(&draw_settings_table, name, value, &next, &given);
     trip_scope_enter(before);
-    if (known && !status)
-        *s = next;
-    return known && !status;
+    if (!known || status || !applies(d, name, &next))
+        return false;
+    d->settings = next;
+    d->clips |= *value && !strncmp(name, "clip-", 5); /* clipping that is set becomes active */
+    return true;
 }
 
 static bool set_switch(trip_document *d, const trip_effect_switch *e, const char *value)
@@ -315,10 +335,10 @@ bool trip_session_set(trip_session *s, const char *name, const char *value)
     trip_document *d = trip_viewer_document(&s->viewer);
     if (d && !strcmp(name, "opacity"))
         good = set_number(&d->opacity_scale, value, 1e-3, 1e3);
-    else if (d && !strcmp(name, "light"))
+    else if (d && !d->is_scene && !strcmp(name, "light"))
         good = set_light(d, value);
     else if (d)
-        good = set_effect(d, name, value) || set_setting(&d->settings, name, value);
+        good = (!d->is_scene && set_effect(d, name, value)) || set_setting(d, name, value);
     s->viewer.changed |= good;
     trip_viewer_tick(&s->viewer, 0);
     pthread_mutex_unlock(&s->lock);
@@ -446,6 +466,59 @@ static void add_light(cJSON *root, const trip_document *d)
     cJSON_AddNumberToObject(light, "distance", c.distance);
 }
 
+/* Writes the entries of a choice as trip_session_set() takes them. */
+static void add_choice(cJSON *to, const trip_scene_choice *choice, const trip_document *d)
+{
+    trip_scene_entry entries[TRIP_SCENE_ENTRIES];
+    int chosen;
+    const int count = trip_scene_entries(choice, &d->scene, &d->settings, entries, &chosen);
+    cJSON *item = count > 1 ? cJSON_CreateObject() : NULL;
+    if (!item)
+        return;
+    cJSON_AddStringToObject(item, "name", draw_settings_table.rows[choice->row].name);
+    cJSON_AddStringToObject(item, "label", choice->label);
+    cJSON_AddStringToObject(item, "value", entries[chosen].value);
+    cJSON *names = cJSON_AddArrayToObject(item, "entries");
+    for (int i = 0; i < count; i++) {
+        cJSON *entry = cJSON_CreateObject();
+        cJSON_AddStringToObject(entry, "label", entries[i].label);
+        cJSON_AddStringToObject(entry, "value", entries[i].value);
+        cJSON_AddItemToArray(names, entry);
+    }
+    cJSON_AddItemToArray(to, item);
+}
+
+/* Writes a line about a scene, its choices, and the settings that it has. */
+static void add_scene(cJSON *root, const trip_document *d, const draw_settings *shown,
+                      const trip_frames_status *status)
+{
+    cJSON *scene = cJSON_AddObjectToObject(root, "scene");
+    char text[160];
+    trip_scene_say(&d->scene, shown, status, text, sizeof text);
+    cJSON_AddStringToObject(scene, "text", text);
+    cJSON *choices = cJSON_AddArrayToObject(scene, "choices");
+    for (int i = 0; i < TRIP_SCENE_CHOICES; i++)
+        add_choice(choices, &trip_scene_choices[i], d);
+    cJSON *rows = cJSON_AddArrayToObject(scene, "applies");
+    cJSON_AddItemToArray(rows, cJSON_CreateString("opacity"));
+    for (int i = 0; i < DRAW_OPTIONS; i++)
+        if (draw_settings_applies(&d->settings, i, true))
+            cJSON_AddItemToArray(rows, cJSON_CreateString(draw_settings_table.rows[i].name));
+}
+
+/* Writes the range of the page's clipping box, in world units: lower corner, upper corner. */
+static void add_bounds(cJSON *root, const trip_document *d)
+{
+    triptych_clip all = { 0 };
+    if (d->is_scene)
+        trip_clipping_box_of_all(&all, &d->info, true);
+    const double *corners[2] = { d->is_scene ? all.box_lo : d->info.lo,
+                                 d->is_scene ? all.box_hi : d->info.hi };
+    cJSON *bounds = cJSON_AddArrayToObject(root, "bounds");
+    for (int i = 0; i < 6; i++)
+        cJSON_AddItemToArray(bounds, cJSON_CreateNumber(corners[i / 3][i % 3]));
+}
+
 bool trip_session_take_failure(trip_session *s, char *line, size_t bytes)
 {
     const trip_frames_status status = trip_frames_get_status(s->frames);
@@ -466,11 +539,18 @@ char *trip_session_status(trip_session *s)
     const draw_settings settings = d ? trip_viewer_settings(d) : s->viewer.settings;
     char effects[256];
     trip_effects_say(&settings, d ? trip_viewer_heat(d) : NULL, effects, sizeof effects);
+    const bool of_volume = d && !d->is_scene;
+    cJSON_AddBoolToObject(root, "opened", d && d->opened);
     if (d && d->opened)
+        add_bounds(root, d);
+    if (of_volume && d->opened)
         add_light(root, d);
-    if (d)
+    if (of_volume)
         add_switches(root, d);
-    cJSON_AddStringToObject(root, "function", d && d->function ? d->function : "");
+    if (d && d->is_scene)
+        add_scene(root, d, &settings, &status);
+    const char *function = d ? trip_viewer_function(d) : NULL;
+    cJSON_AddStringToObject(root, "function", function ? function : "");
     cJSON_AddNumberToObject(root, "opacity", d ? d->opacity_scale : 1);
     pthread_mutex_unlock(&s->lock);
     cJSON_AddBoolToObject(root, "exact", status.exact);

@@ -22,13 +22,13 @@ void trip_session_tick(trip_session *s, double seconds);
  * and does nothing, if any line is invalid or of another kind. */
 bool trip_session_do(trip_session *s, const char *text, size_t bytes);
 /* Sets a built-in transfer function or the command line's; "" selects the data set's default.
- * Returns false for unknown names. */
+ * Returns false for unknown names, and for a scene. */
 bool trip_session_set_function(trip_session *s, const char *name);
 
-/* Sets a setting by its name on the page: classify, method, h, shading, opacity, show, or an
- * effect's name in light.h. A light is "head", "turns", "fixed", "AZIMUTH,ELEVATION" or
- * "AZIMUTH,ELEVATION,DISTANCE" of light.h. Returns false, and changes nothing, for an unknown name
- * or an invalid value. */
+/* Sets a setting by its name on the page: opacity, light, an effect's name in light.h, or the name
+ * of an option. A light is "head", "turns", "fixed", "AZIMUTH,ELEVATION" or
+ * "AZIMUTH,ELEVATION,DISTANCE" of light.h. Returns false, and changes nothing, for an unknown name,
+ * an invalid value, or a setting that does not apply to the data. */
 bool trip_session_set(trip_session *s, const char *name, const char *value);
 /* Returns the names of the built-in transfer functions as JSON, for free(), or NULL if memory is
  * exhausted. */

@@ -24,7 +24,7 @@ static bool is_gaussian_file(const char *name)
 {
     if (!*name || !strchr("xyz", *name))
         return false;
-    if (!strcmp(name + 1, ".gaussians"))
+    if (!strcmp(name + 1, ".gaussians") || !strcmp(name + 1, ".palette"))
         return true;
     return !strncmp(name + 1, ".harmonics", 10) && name[11] >= '1' && name[11] <= '3' && !name[12];
 }

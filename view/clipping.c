@@ -3,18 +3,39 @@
 #include <math.h>
 #include <string.h>
 
-void trip_clipping_box_of_all(triptych_clip *c, const triptych_info *info)
+static double half_diagonal(const triptych_info *info)
 {
-    c->box = c->box_of_voxels = 1;
+    double sum = 0;
+    for (int a = 0; a < 3; a++)
+        sum += (info->hi[a] - info->lo[a]) * (info->hi[a] - info->lo[a]);
+    return sum > 0 ? 0.5 * sqrt(sum) : 1;
+}
+
+/* A flat scene gets a part of its diagonal along the axis without extent. */
+static void set_box_of_scene(triptych_clip *c, const triptych_info *info)
+{
     for (int a = 0; a < 3; a++) {
+        const double size = info->hi[a] - info->lo[a];
+        const double more = size > 0 ? size / 4 : half_diagonal(info) / 4;
+        c->box_lo[a] = info->lo[a] - more;
+        c->box_hi[a] = info->hi[a] + more;
+    }
+}
+
+void trip_clipping_box_of_all(triptych_clip *c, const triptych_info *info, bool is_scene)
+{
+    c->box = 1;
+    c->box_of_voxels = !is_scene;
+    if (is_scene)
+        set_box_of_scene(c, info);
+    for (int a = 0; a < 3 && !is_scene; a++) {
         c->box_lo[a] = (double)info->first[a] - 0.5;
         c->box_hi[a] = (double)info->last[a] + 0.5;
     }
 }
 
-void trip_clipping_set_face(triptych_clip *c, int axis, int face, double position)
+void trip_clipping_set_face(triptych_clip *c, int axis, int face, double position, double min)
 {
-    const double min = 0.01; /* minimum size of the box, voxels */
     if (face)
         c->box_hi[axis] = fmax(position, c->box_lo[axis] + min);
     else
@@ -45,14 +66,6 @@ void trip_clipping_remove_plane(triptych_clip *c, int plane)
 {
     c->planes--;
     memmove(c->plane[plane], c->plane[plane + 1], (size_t)(c->planes - plane) * sizeof *c->plane);
-}
-
-static double half_diagonal(const triptych_info *info)
-{
-    double sum = 0;
-    for (int a = 0; a < 3; a++)
-        sum += (info->hi[a] - info->lo[a]) * (info->hi[a] - info->lo[a]);
-    return sum > 0 ? 0.5 * sqrt(sum) : 1;
 }
 
 static double length_of(const double plane[4])

@@ -11,10 +11,11 @@ extern "C" {
 
 enum { TRIP_CLIPPING_PLANES = 6 };
 
-/* Sets the box to all kept voxels, in voxel indices, including half a voxel around them. */
-void trip_clipping_box_of_all(triptych_clip *c, const triptych_info *info);
-/* Moves face 0 (lower) or 1 (upper) of an axis. The faces never cross. */
-void trip_clipping_set_face(triptych_clip *c, int axis, int face, double position);
+/* Sets the box to all kept voxels, in voxel indices, including half a voxel around them. For a
+ * scene, sets it to the bounds that views fit and a quarter more on each side, in world units. */
+void trip_clipping_box_of_all(triptych_clip *c, const triptych_info *info, bool is_scene);
+/* Moves face 0 (lower) or 1 (upper) of an axis. The faces stay at least `min` apart. */
+void trip_clipping_set_face(triptych_clip *c, int axis, int face, double position, double min);
 
 /* Adds a plane through the point looked at, facing the eye. It cuts away the side of the eye.
  * Returns false if there are TRIP_CLIPPING_PLANES already. */

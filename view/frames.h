@@ -60,7 +60,7 @@ typedef struct trip_wanted {
     const char *function;       /* preset or file; NULL means the data set's default */
     const char *text;           /* a transfer function as text, in place of `function` */
     double opacity_scale;
-    draw_settings settings;
+    draw_settings settings; /* the parts that do not apply to the data are left out */
 } trip_wanted;
 
 /* Replaces the wanted view. */
@@ -70,10 +70,12 @@ void trip_frames_want(trip_frames *f, const trip_wanted *wanted);
  * and each new transfer function as text. */
 typedef struct trip_opened {
     unsigned document;
-    bool first;         /* just opened; otherwise only navigation and function are set */
-    bool small;         /* as find() set it */
-    bool cold;          /* the heat data set failed to open; drawn without emission */
-    triptych_info info; /* notes is NULL */
+    bool first;           /* just opened; otherwise only navigation and function are set */
+    bool small;           /* as find() set it */
+    bool cold;            /* the heat data set failed to open; drawn without emission */
+    bool is_scene;        /* a Gaussian scene: `info` has only the bounds that views fit */
+    triptych_info info;   /* notes is NULL */
+    triptych_scene scene; /* notes is NULL; zero for a volume */
     triptych_histogram histogram;
     char *function; /* as text in data units; NULL if unchanged or without such a text */
     trip_navigation navigation;

@@ -44,6 +44,7 @@ struct trip_frames {
     bool small;                 /* as find() set it */
     bool cold;                  /* the heat data set failed to open */
     bool open, announced, warm; /* a data set is open; the window knows; a frame was drawn */
+    bool is_scene;              /* the open data set is a Gaussian scene */
     bool frugal;                /* keeps no pages between frames */
     bool plain;                 /* moving views have no coarse levels */
     bool by_values;             /* has coarse levels for post only: moving views use post */
@@ -60,6 +61,8 @@ struct trip_frames {
     bool awaits_choice;         /* the full picture has the defaults until triptych_choose() */
     bool whole;                 /* rgba is the full picture of the wanted view */
     double shown_ms;            /* time of the last shown picture */
+    double woken_ms;            /* time of the last shown progress */
+    double taken_ms;            /* the last part of a picture took this long */
 };
 
 /* Prepares the state that other threads may cancel. Call it before the drawing thread starts. */

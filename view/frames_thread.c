@@ -7,6 +7,7 @@
 #include "clock.h"
 #include "frames_state.h"
 #include "report.h"
+#include "scene.h"
 
 static void wake(trip_frames *f)
 {
@@ -22,6 +23,8 @@ static void wake(trip_frames *f)
 #define MOVING_SHARE 0.85
 #define MOVING_MAX 1.5
 #define DEFAULT_FPS 30.0
+/* A small frame is left out if it takes more than this share of the full frame's time. */
+#define LITTLE_SHARE 0.75
 
 /* ---- messages ---- */
 
@@ -68,8 +71,8 @@ static void show_stage(trip_frames *f, const char *stage, double done)
     f->status.done = done;
     pthread_mutex_unlock(&f->lock);
     const double ms = trip_now_ms();
-    if (ms - f->shown_ms > 50) {
-        f->shown_ms = ms;
+    if (ms - f->woken_ms > 50) {
+        f->woken_ms = ms;
         wake(f);
     }
 }
@@ -206,17 +209,21 @@ static int open_data(trip_frames *f)
                                                       .choices_folder = p->choices_folder,
                                                       .choose_later = 1,
                                                       .name = w->input });
-    if (!status && triptych_is_scene(f->t)) {
-        triptych_close(f->t);
-        status = trip_fail(TRIP_USAGE, "view", w->input,
-                           "is a Gaussian scene; `triptych render` draws it");
-    }
-    if (!status && w->heat)
+    f->is_scene = !status && triptych_is_scene(f->t);
+    if (!status && w->heat && !f->is_scene)
         status = open_heat(f);
     f->open = status == 0;
-    f->by_values = f->open && has_levels(f->t, TRIPTYCH_CLASSIFY_POST) &&
+    f->by_values = f->open && !f->is_scene && has_levels(f->t, TRIPTYCH_CLASSIFY_POST) &&
                    !has_levels(f->t, TRIPTYCH_CLASSIFY_PRE);
     return status;
+}
+
+/* A scene has colours of its own, and only the factor on its opacity applies. */
+static void drop_function_of_scene(trip_frames *f)
+{
+    free((char *)(uintptr_t)f->now.function);
+    free((char *)(uintptr_t)f->now.text);
+    f->now.function = f->now.text = NULL;
 }
 
 static int use_function(trip_frames *f)
@@ -244,7 +251,7 @@ static int use_function(trip_frames *f)
     pthread_mutex_lock(&f->lock);
     f->status.left_out = !status && left_out;
     pthread_mutex_unlock(&f->lock);
-    f->other_function |= !status && !w->text;
+    f->other_function |= !status && !w->text && !f->is_scene;
     free(f->function);
     f->function = status ? NULL : key;
     if (status)
@@ -257,13 +264,14 @@ static int use_function(trip_frames *f)
 static draw_settings with_levels(const trip_frames *f, double lod_px, double max_ms)
 {
     draw_settings s = f->now.settings;
-    if (f->plain)
+    if (f->plain || !draw_settings_applies(&s, DRAW_LOD, f->is_scene))
         return s;
     /* Use post, unless a setting requires splats. */
     if (f->by_values && s.all.classify == TRIPTYCH_CLASSIFY_PRE)
         s.all.classify = TRIPTYCH_CLASSIFY_AUTO;
     s.lod.voxel_px = fmax(s.lod.voxel_px, lod_px);
-    s.lod.max_ms = s.lod.max_ms > 0 ? fmin(s.lod.max_ms, max_ms) : max_ms;
+    if (draw_settings_applies(&s, DRAW_MAX_MS, f->is_scene))
+        s.lod.max_ms = s.lod.max_ms > 0 ? fmin(s.lod.max_ms, max_ms) : max_ms;
     return s;
 }
 
@@ -306,8 +314,20 @@ static char *text_of_function(trip_frames *f)
     return text;
 }
 
+static int describe_scene(trip_frames *f, trip_opened *o)
+{
+    int status = triptych_get_scene(f->t, &o->scene);
+    o->scene.notes = NULL;
+    o->info = trip_scene_bounds(&o->scene);
+    o->is_scene = true;
+    o->source = strdup(f->source);
+    return status;
+}
+
 static int describe(trip_frames *f, trip_opened *o)
 {
+    if (f->is_scene)
+        return describe_scene(f, o);
     int status = triptych_get_info(f->t, &o->info);
     if (status)
         return status;
@@ -421,7 +441,9 @@ typedef struct frame {
     double begun_ms;
 } frame;
 
-enum { STEP_NS = 10000000, PART_MS = 150, MAX_MS = 1000 };
+enum { STEP_NS = 10000000, PART_MS = 150, SLOW_MS = 400, MAX_MS = 1000 };
+/* Taking and showing the parts of a picture takes at most about this share of its time. */
+#define PARTS_SHARE 0.2
 
 /* Moving frames are abandoned only if they take long. */
 static bool gives_up(trip_frames *f, const frame *d)
@@ -429,16 +451,25 @@ static bool gives_up(trip_frames *f, const frame *d)
     return has_newer(f) && (!d->first || trip_now_ms() - d->begun_ms > MAX_MS || has_other(f));
 }
 
+static int show_part(trip_frames *f, const frame *d)
+{
+    const double begun_ms = trip_now_ms();
+    int status = triptych_picture(f->t, f->rgba);
+    if (!status)
+        show(f, d->width, d->height, false);
+    f->taken_ms = trip_now_ms() - begun_ms;
+    return status;
+}
+
 static int step(trip_frames *f, const frame *d)
 {
     int status = triptych_step(f->t, trip_now_ns() + STEP_NS);
     if (status == TRIPTYCH_STEP_WAITS)
         triptych_await(f->t, STEP_NS);
-    if (status > 0 && d->first && trip_now_ms() - f->shown_ms > PART_MS) {
-        int taken = triptych_picture(f->t, f->rgba);
-        if (taken)
-            return taken;
-        show(f, d->width, d->height, false);
+    const double pause_ms = fmax(PART_MS, f->taken_ms / PARTS_SHARE);
+    if (status > 0 && d->first && trip_now_ms() - f->shown_ms > pause_ms) {
+        int taken = show_part(f, d);
+        status = taken ? taken : status;
     }
     return status;
 }
@@ -560,9 +591,9 @@ static int draw_moving(trip_frames *f, double target_ms)
     const double detail = trip_pace_scale(&f->pace, wanted_pixels(f), MOVING_SHARE * target_ms);
     const double scale = sqrt(detail);
     draw_settings settings = with_levels(f, MOVING_LOD_PX * scale / detail, MOVING_MAX * target_ms);
-    if (settings.sheet.samples <= 0 && draw_settings_may_use_sheets(&settings))
+    if (!f->is_scene && settings.sheet.samples <= 0 && draw_settings_may_use_sheets(&settings))
         settings.sheet.samples = MOVING_SAMPLES;
-    if (settings.all.samples <= 0)
+    if (!f->is_scene && settings.all.samples <= 0) /* scenes have one by default */
         settings.all.samples = 1;
     return draw(f, scale, detail, &settings, true);
 }
@@ -589,6 +620,15 @@ static int draw_chosen(trip_frames *f)
     return status ? status : draw(f, 1, 1, &f->now.settings, false);
 }
 
+/* Returns whether a frame of fewer pixels would take long, and about as long as the full one. Every
+ * Gaussian in view is read for both. */
+static bool gains_little(const trip_frames *f, double target_ms, double whole_ms)
+{
+    const double detail = trip_pace_scale(&f->pace, wanted_pixels(f), MOVING_SHARE * target_ms);
+    const double small_ms = trip_pace_expect_ms(&f->pace, detail * detail * wanted_pixels(f));
+    return f->is_scene && small_ms > SLOW_MS && small_ms > LITTLE_SHARE * whole_ms;
+}
+
 /* Draws a picture at once, then the full one. If the full one takes long, draws a coarse one of
  * full size between them. */
 static int draw_whole(trip_frames *f)
@@ -599,10 +639,12 @@ static int draw_whole(trip_frames *f)
     const double target_ms = 1000 / (wanted > 0 ? wanted : DEFAULT_FPS);
     const double whole_ms = trip_pace_expect_ms(&f->whole_pace, wanted_pixels(f));
     /* the memory of a small frame could be too much beside a full one */
-    if (f->plain || (whole_ms > 0 && whole_ms < target_ms))
+    if (f->plain ||
+        (whole_ms > 0 && (whole_ms < target_ms || gains_little(f, target_ms, whole_ms))))
         return draw(f, 1, 1, whole, true);
     int status = draw_moving(f, target_ms);
-    if (!status && !f->whole && whole_ms > LONG_MS && !has_newer(f))
+    if (!status && !f->whole && whole_ms > LONG_MS && !has_newer(f) &&
+        draw_settings_applies(whole, DRAW_LOD, f->is_scene))
         status = draw_coarse(f, whole_ms);
     if (!status && !f->whole && !has_newer(f))
         status = draw(f, 1, 1, whole, false);
@@ -623,6 +665,10 @@ static int prepare(trip_frames *f)
         close_data(f);
         status = open_data(f);
     }
+    if (!status)
+        draw_settings_drop_kind(&f->now.settings, f->is_scene);
+    if (!status && f->is_scene)
+        drop_function_of_scene(f);
     if (f->cold)
         f->now.settings.effects.which &= ~TRIPTYCH_EFFECT_EMISSION;
     if (!status)

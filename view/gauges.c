@@ -64,7 +64,11 @@ static void add_document(cJSON *root, trip_viewer *v)
     cJSON_AddNumberToObject(root, "documents", v->count);
     if (d)
         cJSON_AddStringToObject(root, "input", d->input);
-    cJSON *dims = d && d->opened ? cJSON_AddArrayToObject(root, "dims") : NULL;
+    if (d && d->is_scene) {
+        cJSON_AddNumberToObject(root, "gaussians", (double)d->scene.gaussians);
+        cJSON_AddStringToObject(root, "order", draw_settings_choice(&d->settings, DRAW_ORDER));
+    }
+    cJSON *dims = d && d->opened && !d->is_scene ? cJSON_AddArrayToObject(root, "dims") : NULL;
     for (int a = 0; a < 3 && dims; a++)
         cJSON_AddItemToArray(dims, cJSON_CreateNumber((double)d->info.dims[a]));
     if (camera)
@@ -85,7 +89,8 @@ static int write_text(const char *path, const char *text)
     return fclose(f) == 0 && good ? 0 : trip_fail_errno("view", path, "cannot write");
 }
 
-int trip_gauges_write(const trip_gauges *g, trip_viewer *v, const char *path)
+int trip_gauges_write(const trip_gauges *g, trip_viewer *v, const char *const *labels, int count,
+                      const char *path)
 {
     const int max = (int)(TRIP_FRAMES_TIMES + TRIP_GAUGES_ANSWERS);
     cJSON *root = cJSON_CreateObject();
@@ -95,6 +100,7 @@ int trip_gauges_write(const trip_gauges *g, trip_viewer *v, const char *path)
         const trip_frames_status status = trip_frames_get_status(v->frames);
         add_document(root, v);
         add_status(root, &status);
+        cJSON_AddItemToObject(root, "controls", cJSON_CreateStringArray(labels, count));
         add_times(root, "moving_ms", ms, trip_frames_get_times(v->frames, max, ms));
         const int answers =
             (int)(g->answered < TRIP_GAUGES_ANSWERS ? g->answered : TRIP_GAUGES_ANSWERS);

@@ -22,8 +22,10 @@ void trip_gauges_note_answer(trip_gauges *g, double ms);
 /* Returns the quantile `part` (0 to 1) of the values, or 0 if there are none. Reorders them. */
 double trip_gauges_quantile(float *values, int count, double part);
 
-/* Writes the statistics as JSON. Returns 0, or a reported failure. */
-int trip_gauges_write(const trip_gauges *g, trip_viewer *v, const char *path);
+/* Writes the statistics as JSON, with the labels of the panel's controls, `count` of them. Returns
+ * 0, or a reported failure. */
+int trip_gauges_write(const trip_gauges *g, trip_viewer *v, const char *const *labels, int count,
+                      const char *path);
 
 #ifdef __cplusplus
 }

@@ -18,6 +18,7 @@
 #include "clipping.h"
 #include "light.h"
 #include "report.h"
+#include "scene.h"
 
 namespace
 {
@@ -191,6 +192,28 @@ void draw_view(trip_panel *p, trip_viewer *v, trip_document *d)
         trip_navigation_set_fov(n, fov);
         v->changed = true;
     }
+}
+
+// ---- controls of volumes and scenes ----
+
+bool draw_background(trip_panel *p, draw_settings *s)
+{
+    float rgb[3];
+    for (int i = 0; i < 3; i++)
+        rgb[i] = static_cast<float>(draw_settings_background(s)[i]);
+    if (!mark_beside(p, "Background", ImGui::ColorEdit3("Background", rgb)))
+        return false;
+    s->background[3] = draw_settings_background(s)[3];
+    for (int i = 0; i < 3; i++)
+        s->background[i] = static_cast<double>(rgb[i]);
+    s->has_background = 1;
+    return true;
+}
+
+bool draw_opacity(trip_panel *p, trip_document *d)
+{
+    return slide(p, "Opacity", &d->opacity_scale, 0.01, 100, "x %.3g",
+                 ImGuiSliderFlags_Logarithmic);
 }
 
 // ---- the transfer function ----
@@ -444,9 +467,34 @@ void draw_function(trip_panel *p, trip_viewer *v, trip_document *d)
         trip_tf_editor_redo(d->editor);
         d->edited = true;
     }
-    v->changed |=
-        slide(p, "Opacity", &d->opacity_scale, 0.01, 100, "x %.3g", ImGuiSliderFlags_Logarithmic);
+    v->changed |= draw_opacity(p, d);
     draw_function_file(p, v, d);
+}
+
+// ---- scenes ----
+
+bool choose_of_scene(trip_panel *p, trip_document *d, const trip_scene_choice &choice)
+{
+    trip_scene_entry entries[TRIP_SCENE_ENTRIES];
+    const char *names[TRIP_SCENE_ENTRIES];
+    int chosen;
+    const int count = trip_scene_entries(&choice, &d->scene, &d->settings, entries, &chosen);
+    for (int i = 0; i < count; i++)
+        names[i] = entries[i].label;
+    if (count < 2 || !choose(p, choice.label, &chosen, names, count))
+        return false;
+    trip_scene_choose(&choice, &entries[chosen], &d->settings);
+    return true;
+}
+
+bool draw_scene(trip_panel *p, trip_document *d)
+{
+    bool changed = false;
+    for (const trip_scene_choice &choice : trip_scene_choices)
+        changed |= choose_of_scene(p, d, choice);
+    changed |= draw_opacity(p, d);
+    changed |= draw_background(p, &d->settings);
+    return changed;
 }
 
 // ---- light, quality ----
@@ -519,22 +567,12 @@ bool draw_light(trip_panel *p, trip_document *d)
     }
     if (!head)
         changed |= draw_light_position(p, d);
-    float rgb[3];
-    for (int i = 0; i < 3; i++)
-        rgb[i] = static_cast<float>(draw_settings_background(s)[i]);
-    if (mark_beside(p, "Background", ImGui::ColorEdit3("Background", rgb))) {
-        s->background[3] = draw_settings_background(s)[3];
-        for (int i = 0; i < 3; i++)
-            s->background[i] = static_cast<double>(rgb[i]);
-        s->has_background = 1;
-        changed = true;
-    }
-    return changed;
+    return draw_background(p, s) || changed;
 }
 
-bool draw_quality(trip_panel *p, trip_document *d)
+// Settings of interpolation and of the choice by error.
+bool draw_quality_of_volume(trip_panel *p, draw_settings *s)
 {
-    draw_settings *s = &d->settings;
     static const char *const qualities[] = { "Draft", "Normal", "High", "Exact" };
     static const char *const classes[] = { "Automatic", "Pre (splats)", "Post (interpolation)" };
     static const int normal = TRIPTYCH_QUALITY_NORMAL;
@@ -550,14 +588,28 @@ bool draw_quality(trip_panel *p, trip_document *d)
             ImGui::SliderInt("Samples per sheet", &samples, 0, 16, samples ? "%d" : "automatic"));
         s->sheet.samples = samples;
     }
+    return changed;
+}
+
+bool draw_level(trip_panel *p, draw_settings *s)
+{
     // The leftmost position is automatic. 0 px stands for the finest level.
     double lod = s->lod.voxel_px == TRIPTYCH_ZERO ? 0
                  : s->lod.voxel_px > 0            ? s->lod.voxel_px
                                                   : -0.1;
-    if (slide(p, "Level of detail", &lod, -0.1, 8, lod < 0 ? "automatic" : "%.1f px")) {
+    const bool changed =
+        slide(p, "Level of detail", &lod, -0.1, 8, lod < 0 ? "automatic" : "%.1f px");
+    if (changed)
         s->lod.voxel_px = lod < -0.05 ? 0 : lod < 0.05 ? TRIPTYCH_ZERO : lod;
-        changed = true;
-    }
+    return changed;
+}
+
+bool draw_quality(trip_panel *p, trip_document *d)
+{
+    draw_settings *s = &d->settings;
+    bool changed = !d->is_scene && draw_quality_of_volume(p, s);
+    if (draw_settings_applies(s, DRAW_LOD, d->is_scene))
+        changed |= draw_level(p, s);
     int rays = s->all.samples > 0 ? s->all.samples : 0;
     changed |=
         mark_beside(p, "Antialiasing",
@@ -584,12 +636,14 @@ bool draw_papers(trip_panel *p, trip_document *d)
     static const char *const methods[] = { "Merge", "Clip", "Axis" };
     static const char *const sums[] = { "Per splat", "Per sheet" };
     static const int merge = TRIPTYCH_METHOD_MERGE, by_splat = TRIPTYCH_COMPOSITING_SPLAT;
-    bool changed = choose_setting(p, "Method", &s->all.method, methods, 3, merge);
-    if (s->all.method <= TRIPTYCH_METHOD_MERGE)
+    bool changed = false;
+    if (draw_settings_applies(s, DRAW_METHOD, d->is_scene))
+        changed |= choose_setting(p, "Method", &s->all.method, methods, 3, merge);
+    if (s->all.method <= TRIPTYCH_METHOD_MERGE && draw_settings_applies(s, DRAW_H, d->is_scene))
         changed |= slide_or_default(p, "Blend start (h)", &s->all.h, 0.01, 0.99, "%.2f");
     changed |=
         slide_or_default(p, "Early termination", &s->all.early_termination, 0.001, 0.1, "%.3f");
-    if (draw_settings_classify(s) != TRIPTYCH_CLASSIFY_POST) {
+    if (!d->is_scene && draw_settings_classify(s) != TRIPTYCH_CLASSIFY_POST) {
         double radius = s->splat.kernel_radius > 0 ? s->splat.kernel_radius : 2;
         changed |= choose_setting(p, "Compositing", &s->splat.compositing, sums, 2, by_splat);
         if (slide(p, "Kernel radius", &radius, 1.5, 6, "%.2f voxels")) {
@@ -615,21 +669,27 @@ bool draw_shown(trip_panel *p, trip_document *d)
     return changed;
 }
 
+// A box of voxels has a slider for each face. So has the box of a scene, in world units.
 bool draw_clip_box(trip_panel *p, trip_document *d)
 {
-    static const char *const labels[3][2] = { { "i min", "i max" },
-                                              { "j min", "j max" },
-                                              { "k min", "k max" } };
+    static const char *const labels[2][3][2] = {
+        { { "i min", "i max" }, { "j min", "j max" }, { "k min", "k max" } },
+        { { "x min", "x max" }, { "y min", "y max" }, { "z min", "z max" } },
+    };
     triptych_clip *c = &d->settings.clip;
+    triptych_clip all = {};
     bool changed = check(p, "Clip box", &c->box);
+    trip_clipping_box_of_all(&all, &d->info, d->is_scene);
     if (changed && c->box && !(c->box_lo[0] < c->box_hi[0]))
-        trip_clipping_box_of_all(c, &d->info);
-    for (int i = 0; i < 6 && c->box && c->box_of_voxels; i++) {
+        trip_clipping_box_of_all(c, &d->info, d->is_scene);
+    for (int i = 0; i < 6 && c->box && (c->box_of_voxels || d->is_scene); i++) {
         const int axis = i / 2, face = i % 2;
         double position = face ? c->box_hi[axis] : c->box_lo[axis];
-        if (slide(p, labels[axis][face], &position, static_cast<double>(d->info.first[axis]) - 0.5,
-                  static_cast<double>(d->info.last[axis]) + 0.5, "%.1f")) {
-            trip_clipping_set_face(c, axis, face, position);
+        if (slide(p, labels[d->is_scene][axis][face], &position, all.box_lo[axis], all.box_hi[axis],
+                  d->is_scene ? "%.4g" : "%.1f")) {
+            trip_clipping_set_face(c, axis, face, position,
+                                   d->is_scene ? (all.box_hi[axis] - all.box_lo[axis]) / 1e4
+                                               : 0.01);
             changed = true;
         }
     }
@@ -673,25 +733,22 @@ bool draw_clipping(trip_panel *p, trip_document *d)
     return changed;
 }
 
-void draw_marks(trip_panel *p, trip_viewer *v)
+void draw_marks(trip_panel *p, trip_viewer *v, bool is_scene)
 {
     check(p, "Box", &v->box);
     ImGui::SameLine();
     check(p, "Axes", &v->axes);
     ImGui::SameLine();
     check(p, "Scale bar", &v->scale_bar);
-    check(p, "Probe", &v->probe);
+    if (!is_scene)
+        check(p, "Probe", &v->probe);
 }
 
 // ---- statistics ----
 
-void draw_gauges(trip_panel *p, trip_viewer *v)
+void draw_memory(trip_panel *p, const triptych_frame_stats &f)
 {
-    const trip_frames_status &s = v->status;
-    const triptych_frame_stats &f = s.stats;
     char text[96];
-    float times[TIMES];
-    const int count = trip_frames_get_times(v->frames, TIMES, times);
     const double part = f.memory_bytes ? static_cast<double>(f.peak_memory_bytes) /
                                              static_cast<double>(f.memory_bytes)
                                        : 0;
@@ -702,6 +759,11 @@ void draw_gauges(trip_panel *p, trip_viewer *v)
                        text);
     ImGui::SameLine();
     ImGui::TextUnformatted("Memory");
+}
+
+void draw_cached(trip_panel *p, const triptych_frame_stats &f)
+{
+    char text[96];
     const double all = static_cast<double>(f.bytes_read + f.bytes_cached);
     std::snprintf(text, sizeof text, "%s of %s",
                   bytes_text(static_cast<double>(f.bytes_cached)).c_str(), bytes_text(all).c_str());
@@ -709,12 +771,35 @@ void draw_gauges(trip_panel *p, trip_viewer *v)
                        ImVec2(-70 * static_cast<float>(p->scale), 0), text);
     ImGui::SameLine();
     ImGui::TextUnformatted("Cached");
-    ImGui::Text("%s read, %s/s; %.3g million splats",
+}
+
+void draw_gauges(trip_panel *p, trip_viewer *v, const trip_document *d)
+{
+    const trip_frames_status &s = v->status;
+    const triptych_frame_stats &f = s.stats;
+    const draw_settings shown = trip_viewer_settings(d);
+    char text[160], level[64] = "";
+    float times[TIMES];
+    const int count = trip_frames_get_times(v->frames, TIMES, times);
+    if (d->is_scene) {
+        trip_scene_say(&d->scene, &shown, nullptr, text, sizeof text);
+        ImGui::TextWrapped("%s", text);
+    }
+    if (!f.memory_bytes) { // no full picture yet
+        ImGui::TextDisabled("No picture is complete yet.");
+        return;
+    }
+    draw_memory(p, f);
+    if (!d->is_scene) // the system caches the files of a scene
+        draw_cached(p, f);
+    ImGui::Text("%s read, %s/s; %.3g million %s",
                 bytes_text(static_cast<double>(f.bytes_read)).c_str(),
                 bytes_text(f.ms > 0 ? static_cast<double>(f.bytes_read) / f.ms * 1e3 : 0).c_str(),
-                static_cast<double>(f.splats) * 1e-6);
-    ImGui::TextWrapped("moving: %.0f ms, resolution 1/%.1f, level of detail %.1f px; full: %.0f ms",
-                       s.moving_ms, s.scale > 0 ? 1 / s.scale : 1.0, s.lod_px, s.whole_ms);
+                static_cast<double>(f.splats) * 1e-6, d->is_scene ? "drawn" : "splats");
+    if (draw_settings_applies(&shown, DRAW_LOD, d->is_scene))
+        std::snprintf(level, sizeof level, ", level of detail %.1f px", s.lod_px);
+    ImGui::TextWrapped("moving: %.0f ms, resolution 1/%.1f%s; full: %.0f ms", s.moving_ms,
+                       s.scale > 0 ? 1 / s.scale : 1.0, level, s.whole_ms);
     ImGui::PlotLines("##times", times, count, 0, "ms", 0, FLT_MAX,
                      ImVec2(ImGui::GetContentRegionAvail().x, 40 * static_cast<float>(p->scale)));
     ImGui::TextWrapped("%s, %s; %s", s.renderer, s.device, s.engine);
@@ -911,7 +996,7 @@ void draw_over(trip_panel *p, trip_viewer *v)
             draw_axes(list, v, d);
         if (v->scale_bar)
             draw_scale_bar(list, v, d, p->scale);
-        if (v->probe)
+        if (v->probe && !d->is_scene)
             draw_probe(list, v, d);
     }
     draw_progress(list, v, p->scale);
@@ -931,11 +1016,13 @@ void draw_document(trip_panel *p, trip_viewer *v, trip_document *d)
         draw_view(p, v, d);
     if (!d->opened)
         return;
-    if (section(p, "Transfer function"))
+    if (d->is_scene && section(p, "Scene"))
+        v->changed |= draw_scene(p, d);
+    if (!d->is_scene && section(p, "Transfer function"))
         draw_function(p, v, d);
-    if (section(p, "Light"))
+    if (!d->is_scene && section(p, "Light"))
         v->changed |= draw_light(p, d);
-    if (section(p, "Effects", d->settings.effects.which != 0))
+    if (!d->is_scene && section(p, "Effects", d->settings.effects.which != 0))
         v->changed |= draw_effects(p, d);
     if (section(p, "Quality"))
         v->changed |= draw_quality(p, d);
@@ -944,11 +1031,11 @@ void draw_document(trip_panel *p, trip_viewer *v, trip_document *d)
     if (section(p, "Clipping", false))
         v->changed |= draw_clipping(p, d);
     if (section(p, "Show")) {
-        v->changed |= draw_shown(p, d);
-        draw_marks(p, v);
+        v->changed |= !d->is_scene && draw_shown(p, d);
+        draw_marks(p, v, d->is_scene);
     }
     if (section(p, "Statistics"))
-        draw_gauges(p, v);
+        draw_gauges(p, v, d);
     if (section(p, "Plan", false))
         draw_plan(p, v);
 }
@@ -1116,4 +1203,13 @@ bool trip_panel_find(trip_panel *p, const char *label, double box[4])
     box[2] = static_cast<double>(b.hi.x);
     box[3] = static_cast<double>(b.hi.y);
     return b.seen;
+}
+
+int trip_panel_labels(const trip_panel *p, const char *labels[TRIP_PANEL_LABELS])
+{
+    int count = 0;
+    for (const auto &box : p->boxes)
+        if (count < TRIP_PANEL_LABELS)
+            labels[count++] = box.first.c_str();
+    return count;
 }

@@ -29,6 +29,11 @@ void trip_panel_draw(trip_panel *p, trip_viewer *v, double seconds);
  * there is none. The next frames scroll a hidden control into view. */
 bool trip_panel_find(trip_panel *p, const char *label, double box[4]);
 
+enum { TRIP_PANEL_LABELS = 256 };
+/* Writes the labels of the controls of the last picture, and returns their number. The labels stay
+ * valid until the next picture. */
+int trip_panel_labels(const trip_panel *p, const char *labels[TRIP_PANEL_LABELS]);
+
 #ifdef __cplusplus
 }
 #endif

@@ -198,7 +198,12 @@ void trip_viewer_close(trip_viewer *v)
 
 const char *trip_viewer_heat(const trip_document *d)
 {
-    return d->cold ? NULL : d->heat;
+    return d->cold || d->is_scene ? NULL : d->heat;
+}
+
+const char *trip_viewer_function(const trip_document *d)
+{
+    return d->is_scene ? NULL : d->function;
 }
 
 draw_settings trip_viewer_settings(const trip_document *d)
@@ -213,6 +218,8 @@ draw_settings trip_viewer_settings(const trip_document *d)
         draw_settings_unset(&s, DRAW_TEMPERATURE);
     }
     draw_settings_drop_excluded(&s, TRIPTYCH_RENDERER_AUTO);
+    if (d->opened)
+        draw_settings_drop_kind(&s, d->is_scene);
     return s;
 }
 
@@ -248,7 +255,10 @@ static void describe(trip_document *d, trip_opened *o)
     d->opened = true;
     d->small = o->small;
     d->cold = o->cold;
+    d->is_scene = o->is_scene;
+    d->edited &= !d->is_scene;
     d->info = o->info;
+    d->scene = o->scene;
     d->histogram = o->histogram;
     free(d->source);
     d->source = o->source;
@@ -469,8 +479,8 @@ static int add_key(trip_document *d)
     char *text = d->edited ? trip_tf_editor_text(d->editor) : NULL;
     int status =
         trip_camera_path_add(p, SECONDS_BETWEEN_KEYS * (double)p->count, &d->navigation, text);
-    if (!status && !text && d->function)
-        p->keys[p->count - 1].function = strdup(d->function);
+    if (!status && !text && trip_viewer_function(d))
+        p->keys[p->count - 1].function = strdup(trip_viewer_function(d));
     free(text);
     if (!status) {
         p->keys[p->count - 1].has_clip = true;
@@ -550,9 +560,9 @@ static void put_look(FILE *out, const trip_document *d, const draw_settings *s)
 {
     char number[32];
     const bool glows = s->effects.which & (TRIPTYCH_EFFECT_EMISSION | TRIPTYCH_EFFECT_AUTO);
-    if (d->function && !d->edited) {
+    if (trip_viewer_function(d) && !d->edited) {
         fputs(" --tf ", out);
-        trip_text_write_word(out, d->function);
+        trip_text_write_word(out, trip_viewer_function(d));
     }
     if (d->opacity_scale != 1)
         fprintf(out, " --opacity-scale %s", trip_text_from_double(d->opacity_scale, number));
@@ -704,18 +714,37 @@ void trip_viewer_let_go(trip_viewer *v)
 static void drop(trip_viewer *v, const char *path)
 {
     const char *dot = strrchr(path, '.');
-    if (dot && !strcmp(dot, ".tf") && trip_viewer_document(v))
+    const trip_document *d = trip_viewer_document(v);
+    const bool is_function = dot && !strcmp(dot, ".tf") && d;
+    if (is_function && d->is_scene)
+        trip_viewer_say(v, "a Gaussian scene has colours of its own: no transfer function applies");
+    else if (is_function)
         trip_viewer_set_function(v, path);
     else
         trip_viewer_open(v, path);
+}
+
+/* Fails if options do not apply to the data. Before the data are open, such options are left out
+ * later. */
+static int check_set(const trip_document *d, const char *options)
+{
+    draw_settings given = { 0 };
+    int status = draw_settings_read_text(&given, options);
+    if (given.scene.order == TRIPTYCH_ORDER_DEFAULT)
+        given.scene.order = d->settings.scene.order;
+    return status || !d->opened
+               ? status
+               : draw_settings_check_kind(&given, &(triptych_resources){ 0 }, d->is_scene);
 }
 
 /* Clipping that is set becomes active. */
 static void set(trip_viewer *v, const char *options)
 {
     trip_document *d = trip_viewer_document(v);
-    if (!d || draw_settings_read_text(&d->settings, options))
+    draw_settings next = d ? d->settings : (draw_settings){ 0 };
+    if (!d || draw_settings_read_text(&next, options) || check_set(d, options))
         return;
+    d->settings = next;
     d->clips |= strstr(options, "--clip-") != NULL;
     v->changed = true;
 }
@@ -785,7 +814,7 @@ static void probe(trip_viewer *v)
     const trip_document *d = navigable(v);
     const bool inside =
         v->at[0] >= 0 && v->at[1] >= 0 && v->at[0] < v->picture_width && v->at[1] < v->height;
-    if (!d || !v->probe || !inside || !v->status.exact ||
+    if (!d || d->is_scene || !v->probe || !inside || !v->status.exact ||
         (!memcmp(v->at, v->probed, sizeof v->at) &&
          !memcmp(&v->probed_from, &d->navigation, sizeof d->navigation)))
         return;

@@ -15,15 +15,17 @@ extern "C" {
 
 /* A data set and how it is drawn. */
 typedef struct trip_document {
-    unsigned number; /* unique */
-    char *input;     /* the user's name for it */
-    bool keep_all;   /* bricked again, with all voxels */
-    char *heat;      /* heat data set; may be NULL */
-    bool cold;       /* heat failed to open; drawn without emission */
-    bool small;      /* a preview of samples; the full volume is still to be bricked */
-    bool opened;     /* the members below are known */
-    triptych_info info;
-    char *source; /* path of the data set */
+    unsigned number;      /* unique */
+    char *input;          /* the user's name for it */
+    bool keep_all;        /* bricked again, with all voxels */
+    char *heat;           /* heat data set; may be NULL */
+    bool cold;            /* heat failed to open; drawn without emission */
+    bool small;           /* a preview of samples; the full volume is still to be bricked */
+    bool opened;          /* the members below are known */
+    bool is_scene;        /* a Gaussian scene */
+    triptych_info info;   /* of a scene: only the bounds that views fit */
+    triptych_scene scene; /* zero for a volume */
+    char *source;         /* path of the data set */
     triptych_histogram histogram;
     bool has_navigation; /* false while the library finds it from `start` */
     triptych_view start;
@@ -85,6 +87,10 @@ void trip_viewer_release(trip_viewer *v);
 trip_document *trip_viewer_document(trip_viewer *v);
 /* Returns the settings for the library, without the parts that the data set cannot draw. */
 draw_settings trip_viewer_settings(const trip_document *d);
+/* Returns the transfer function, a preset or a file; NULL for the data set's default and for
+ * scenes.
+ */
+const char *trip_viewer_function(const trip_document *d);
 /* Returns the heat data set if it can be opened, else NULL. */
 const char *trip_viewer_heat(const trip_document *d);
 /* Opens a data set or volume and shows it. Opens it again if it is open already. */

@@ -330,7 +330,9 @@ static int play_saved(void *user)
 static int play_report(void *user, const char *path)
 {
     window *w = user;
-    return trip_gauges_write(&w->gauges, &w->viewer, path);
+    const char *labels[TRIP_PANEL_LABELS];
+    const int count = trip_panel_labels(w->panel, labels);
+    return trip_gauges_write(&w->gauges, &w->viewer, labels, count, path);
 }
 
 static int play(window *w)

@@ -3,9 +3,10 @@
 #include "folder.h"
 #include "gaussian_check.h"
 #include "gaussian_code.h"
+#include "gaussian_levels.h"
 #include "gaussian_sort.h"
-#include "gaussian_tree.h"
 #include "gaussian_writer.h"
+#include "harmonics_palette.h"
 #include "report.h"
 
 #include <math.h>
@@ -16,11 +17,15 @@ enum {
     BATCH = 128,
     SPOOL_BYTES = 1 << 17,
     PROGRESS_EVERY = 1 << 14,
+    CLASSES = 256,       /* class c has the index c + 128 */
+    GROUP_RECORDS = 512, /* classes of a node with fewer records join larger classes */
 };
 
 /* Precision of a brick's centres: the box has 2^21 codes along an axis. A splat is large enough
  * for a box of 2^15 times its class. */
 #define BOX_CLASSES 32768.0
+/* The greatest mean error of colours by a palette that is selected by itself. */
+#define PALETTE_ERROR (0.5 / 255)
 /* A gap that divides a brick is at least this part of its box. */
 #define GAP_PART 0.25
 
@@ -30,12 +35,26 @@ typedef struct bricker {
     trip_gaussian_writer *writer;
     const char *folder;
     size_t stride;
-    trip_output spool;
-    uint64_t records, dropped, passed;
-    uint64_t by_class[TRIP_GAUSSIAN_CLASSES];
+    trip_output spool; /* the splats as they come, then in the octree's order */
+    uint64_t records, coarse, dropped, passed;
+    double lo[3], hi[3];    /* bounds of the centres */
+    int class_lo, class_hi; /* indices */
     trip_gaussian_sample sample;
     size_t sample_bytes;
     double typical_lo[3], typical_hi[3];
+    trip_octree octree;
+    trip_gaussian_levels *levels;
+    trip_output ordered, merged; /* the next spool: splats of the scene, coarse splats */
+    uint64_t *groups;            /* records by node and class; see group_of() */
+    size_t groups_bytes;
+    uint8_t *joined; /* class index of the group that a group joins */
+    trip_file_gaussian_node *nodes;
+    uint64_t *node_numbers; /* of the octree's nodes */
+    uint64_t node_count;
+    float *vectors; /* a sample of the coefficients */
+    uint64_t vector_count, vector_room, vectors_seen;
+    trip_palette palette;
+    double palette_error;
     /* These belong to the axis that is being written. */
     int axis;
     trip_gaussian_tree tree;
@@ -62,6 +81,26 @@ static void tell_progress(bricker *b)
 {
     if (++b->passed % PROGRESS_EVERY == 0 && b->p->progress)
         b->p->progress(b->p->progress_user, b->passed);
+}
+
+static int class_of(const trip_gaussian *g)
+{
+    return trip_gaussian_size_class(g->deviations) + CLASSES / 2;
+}
+
+static uint64_t class_count(const bricker *b)
+{
+    return (uint64_t)(b->class_hi - b->class_lo + 1);
+}
+
+static int make_output(bricker *b, trip_output *o)
+{
+    return trip_output_create(o,
+                              &(trip_output_params){ .folder = b->folder,
+                                                     .name = TRIP_SPOOL_NAME,
+                                                     .buffer_bytes = SPOOL_BYTES,
+                                                     .unnamed = true },
+                              b->budget);
 }
 
 /* Makes a splat valid, as far as it has finite values. */
@@ -94,7 +133,13 @@ static int spool_splat(bricker *b, trip_gaussian *g)
         b->dropped++;
         return TRIP_OK;
     }
-    b->by_class[trip_gaussian_size_class(g->deviations) + TRIP_GAUSSIAN_CLASSES / 2]++;
+    for (int a = 0; a < 3; a++) {
+        b->lo[a] = fmin(b->lo[a], g->centre[a]);
+        b->hi[a] = fmax(b->hi[a], g->centre[a]);
+    }
+    const int class_index = class_of(g);
+    b->class_lo = class_index < b->class_lo ? class_index : b->class_lo;
+    b->class_hi = class_index > b->class_hi ? class_index : b->class_hi;
     b->records++;
     memcpy(spilled, &head, sizeof head);
     memcpy(spilled + sizeof head, g, sizeof *g);
@@ -125,13 +170,7 @@ static int spool_all(bricker *b)
 {
     const size_t bytes = BATCH * sizeof(trip_gaussian);
     trip_gaussian *batch = trip_budget_take(b->budget, bytes);
-    int status = batch ? trip_output_create(&b->spool,
-                                            &(trip_output_params){ .folder = b->folder,
-                                                                   .name = TRIP_SPOOL_NAME,
-                                                                   .buffer_bytes = SPOOL_BYTES,
-                                                                   .unnamed = true },
-                                            b->budget)
-                       : fail_memory(b);
+    int status = batch ? make_output(b, &b->spool) : fail_memory(b);
     if (status == TRIP_OK)
         status = spool_batches(b, batch);
     trip_budget_release(b->budget, batch, bytes);
@@ -150,7 +189,7 @@ static void add_point(bricker *b, const unsigned char *spilled)
     trip_gaussian_point *to = &b->sample.points[b->sample.count++];
     const trip_gaussian *g = (const void *)(spilled + sizeof(trip_spilled));
     memcpy(to->centre, g->centre, sizeof to->centre);
-    to->class_index = trip_gaussian_size_class(g->deviations) + TRIP_GAUSSIAN_CLASSES / 2;
+    to->group = (uint64_t)class_of(g); /* set_groups_of_sample() adds the node */
 }
 
 /* The buffer of bricks serves for reading too. */
@@ -239,7 +278,8 @@ static unsigned divide(const bricker *b, const unsigned char **splats, unsigned 
 /* Writes splats as a brick. Strays get bricks of their own, so that no other loses precision. */
 static int write_brick(bricker *b, const unsigned char **splats, unsigned count)
 {
-    const int size_class = b->tree.leaves[b->leaf].class_index - TRIP_GAUSSIAN_CLASSES / 2;
+    const uint64_t group = b->tree.leaves[b->leaf].group, node = group / class_count(b);
+    const int size_class = (int)(group % class_count(b)) + b->class_lo - CLASSES / 2;
     double from = 0;
     for (int axis = 0; axis < 3; axis++)
         if (find_gap(b, splats, count, axis, ldexp(1, 2 * size_class), &from)) {
@@ -247,7 +287,8 @@ static int write_brick(bricker *b, const unsigned char **splats, unsigned count)
             const int status = write_brick(b, splats, left);
             return status == TRIP_OK ? write_brick(b, splats + left, count - left) : status;
         }
-    return trip_gaussian_writer_append(b->writer, b->axis, size_class, splats, count);
+    return trip_gaussian_writer_append(b->writer, b->axis, b->node_numbers[node], size_class,
+                                       splats, count);
 }
 
 static int write_gathered(bricker *b)
@@ -270,7 +311,7 @@ static unsigned piece_of(uint64_t left)
 static int gather(void *user, const unsigned char *spilled)
 {
     bricker *b = user;
-    const uint64_t leaf = ((const trip_spilled *)(const void *)spilled)->leaf;
+    const uint64_t leaf = ((const trip_spilled *)(const void *)spilled)->group;
     if (b->gathered == 0) {
         if (b->leaf_left == 0)
             b->leaf_left = b->tree.leaves[leaf].records;
@@ -283,22 +324,324 @@ static int gather(void *user, const unsigned char *spilled)
     return b->gathered == b->piece ? write_gathered(b) : TRIP_OK;
 }
 
+/* ---- levels ---- */
+
+static uint64_t group_of(const bricker *b, uint64_t node, int class_index)
+{
+    return node * class_count(b) + (uint64_t)(class_index - b->class_lo);
+}
+
+static uint64_t group_count(const bricker *b)
+{
+    return b->octree.node_count * class_count(b);
+}
+
+/* Merged splats are at most about as large as the whole cube. Merging splats of one size in all
+ * directions may give a smaller class. */
+static void widen_classes(bricker *b)
+{
+    const float side[3] = { (float)(4 * b->octree.side) };
+    const int most = trip_gaussian_size_class(side) + CLASSES / 2;
+    b->class_hi = most > b->class_hi ? most : b->class_hi;
+    b->class_lo -= b->class_lo > 0;
+}
+
+static void place_in_octree(void *user, const trip_gaussian *g, trip_spilled *head)
+{
+    const bricker *b = user;
+    const trip_octree_place p = trip_octree_place_of(&b->octree, g->centre);
+    head->group = trip_octree_leaf(&b->octree, &p, NULL);
+    head->at = (double)trip_octree_order(&p, b->octree.nodes[head->group].depth);
+}
+
+/* Counts a splat in the octree's order. */
+static int count_splat(void *user, const unsigned char *spilled)
+{
+    bricker *b = user;
+    const trip_gaussian *g = (const void *)(spilled + sizeof(trip_spilled));
+    uint64_t leaf;
+    tell_progress(b);
+    const int status = trip_gaussian_levels_add(b->levels, g, &leaf);
+    b->groups[group_of(b, leaf, class_of(g))]++;
+    return status == TRIP_OK ? trip_output_append(&b->ordered, spilled, b->stride) : status;
+}
+
+static int emit_coarse(void *user, uint64_t node, const trip_gaussian *g)
+{
+    bricker *b = user;
+    unsigned char spilled[sizeof(trip_spilled) + sizeof *g] = { 0 };
+    const trip_spilled head = { .number = b->records + b->coarse, .group = node };
+    memcpy(spilled, &head, sizeof head);
+    memcpy(spilled + sizeof head, g, sizeof *g);
+    b->groups[group_of(b, node, class_of(g))]++;
+    if (trip_gaussian_is_sampled(b->coarse, b->records)) {
+        trip_gaussian_point *to = &b->sample.points[b->sample.count++];
+        memcpy(to->centre, g->centre, sizeof to->centre);
+        to->group = group_of(b, node, class_of(g));
+    }
+    b->coarse++;
+    return trip_output_append(&b->merged, spilled, b->stride);
+}
+
+/* Calls `use` for each splat of the spool. The buffer of bricks serves for reading too. */
+static int for_each_splat(bricker *b, uint64_t records,
+                          int (*use)(bricker *b, const unsigned char *spilled))
+{
+    const uint64_t step = TRIP_GAUSSIAN_BRICK_RECORDS_MAX;
+    int status = TRIP_OK;
+    for (uint64_t first = 0; first < records && status == TRIP_OK; first += step) {
+        const uint64_t left = records - first, count = left < step ? left : step;
+        status = trip_output_read(&b->spool, first * b->stride, b->buffer, count * b->stride);
+        for (uint64_t i = 0; i < count && status == TRIP_OK; i++)
+            status = use(b, b->buffer + i * b->stride);
+        if (status == TRIP_OK)
+            status = check_interrupted(b);
+    }
+    return status;
+}
+
+static int merge_splat(bricker *b, const unsigned char *spilled)
+{
+    uint64_t leaf;
+    tell_progress(b);
+    return trip_gaussian_levels_add(b->levels, (const void *)(spilled + sizeof(trip_spilled)),
+                                    &leaf);
+}
+
+/* Sorts the spool by the octree, and counts for the levels. */
+static int order_spool(bricker *b)
+{
+    int status = make_output(b, &b->ordered);
+    if (status == TRIP_OK)
+        status = trip_gaussian_sort(&(trip_gaussian_sort_params){ .spool = &b->spool,
+                                                                  .records = b->records,
+                                                                  .degree = b->p->degree,
+                                                                  .folder = b->folder,
+                                                                  .path = b->p->path,
+                                                                  .place = place_in_octree,
+                                                                  .emit = count_splat,
+                                                                  .user = b },
+                                    b->budget);
+    if (status == TRIP_OK)
+        status = trip_output_flush(&b->ordered);
+    trip_output_close(&b->spool);
+    b->spool = b->ordered;
+    b->ordered = (trip_output){ .fd = -1 };
+    return status == TRIP_OK ? trip_gaussian_levels_end_pass(b->levels) : status;
+}
+
+/* Gives the points of the sample their groups, and makes room for points of coarse splats. */
+static int set_groups_of_sample(bricker *b)
+{
+    const uint64_t coarse = trip_gaussian_levels_coarse(b->levels);
+    const uint64_t room = b->sample.count + 2 +
+                          (uint64_t)((double)trip_gaussian_sample_room(b->records) *
+                                     ((double)coarse / (double)b->records));
+    trip_gaussian_point *points = trip_budget_take(b->budget, room * sizeof *points);
+    if (!points)
+        return fail_memory(b);
+    for (uint64_t i = 0; i < b->sample.count; i++) {
+        const trip_octree_place p = trip_octree_place_of(&b->octree, b->sample.points[i].centre);
+        points[i] = b->sample.points[i];
+        points[i].group = group_of(b, trip_octree_leaf(&b->octree, &p, NULL), (int)points[i].group);
+    }
+    trip_budget_release(b->budget, b->sample.points, b->sample_bytes);
+    b->sample.points = points;
+    b->sample_bytes = room * sizeof *points;
+    return TRIP_OK;
+}
+
+/* Appends the coarse splats to the spool. */
+static int add_levels(bricker *b)
+{
+    int status = set_groups_of_sample(b);
+    if (status == TRIP_OK)
+        status = make_output(b, &b->merged);
+    if (status == TRIP_OK)
+        status = for_each_splat(b, b->records, merge_splat);
+    if (status == TRIP_OK)
+        status = trip_gaussian_levels_end_pass(b->levels);
+    if (status == TRIP_OK)
+        status = trip_output_flush(&b->merged);
+    if (status == TRIP_OK)
+        status = trip_output_append_output(&b->spool, &b->merged);
+    trip_output_close(&b->merged);
+    return status == TRIP_OK ? trip_output_flush(&b->spool) : status;
+}
+
+/* Joins groups with few records to the group of the next larger class in their node. */
+static void join_groups(bricker *b)
+{
+    for (uint64_t node = 0; node < b->octree.node_count; node++) {
+        int next = -1;
+        for (int c = b->class_hi; c >= b->class_lo; c--) {
+            const uint64_t group = group_of(b, node, c);
+            b->joined[group] = (uint8_t)c;
+            if (!b->groups[group])
+                continue;
+            if (next < 0 || b->groups[group] >= GROUP_RECORDS) {
+                next = c;
+                continue;
+            }
+            b->groups[group_of(b, node, next)] += b->groups[group];
+            b->groups[group] = 0;
+            b->joined[group] = (uint8_t)next;
+        }
+    }
+    for (uint64_t i = 0; i < b->sample.count; i++) {
+        const uint64_t group = b->sample.points[i].group;
+        b->sample.points[i].group = group_of(b, group / class_count(b), b->joined[group]);
+    }
+}
+
+/* Adds a node of the octree and the nodes inside it to the table, as far as they have splats.
+ * Returns the level of the highest one, or -1. */
+static int add_nodes(bricker *b, uint64_t number)
+{
+    const trip_octree_node *from = &b->octree.nodes[number];
+    const uint64_t made = b->node_count;
+    const bool kept = trip_gaussian_levels_records(b->levels, number) > 0;
+    int level = -1;
+    if (kept) {
+        b->node_numbers[number] = made;
+        b->nodes[made].width = trip_gaussian_levels_width(b->levels, number);
+        b->node_count++;
+    }
+    for (int i = 0; from->children[0] && i < 8; i++) {
+        const int below = add_nodes(b, (uint64_t)from->children[i]);
+        level = below > level ? below : level;
+    }
+    if (!kept)
+        return level;
+    b->nodes[made].nodes = b->node_count - made;
+    b->nodes[made].level = (uint32_t)(level + 1);
+    return level + 1;
+}
+
+static size_t nodes_bytes(const bricker *b)
+{
+    return b->octree.node_count * (sizeof *b->nodes + sizeof *b->node_numbers);
+}
+
+static int make_nodes(bricker *b)
+{
+    b->nodes = trip_budget_take(b->budget, nodes_bytes(b));
+    if (!b->nodes)
+        return fail_memory(b);
+    b->node_numbers = (void *)(b->nodes + b->octree.node_count);
+    add_nodes(b, 0);
+    trip_gaussian_writer_set_nodes(b->writer, b->nodes, b->node_count);
+    return TRIP_OK;
+}
+
+static int make_levels(bricker *b)
+{
+    if (!trip_octree_build(&b->octree, &b->sample, b->records, b->lo, b->hi, b->budget))
+        return fail_memory(b);
+    widen_classes(b);
+    b->groups_bytes = group_count(b) * (sizeof *b->groups + sizeof *b->joined);
+    b->groups = trip_budget_take(b->budget, b->groups_bytes);
+    b->joined = (void *)(b->groups + (b->groups ? group_count(b) : 0));
+    if (!b->groups ||
+        !trip_gaussian_levels_begin(
+            &b->levels,
+            &(trip_gaussian_levels_params){
+                .octree = &b->octree, .degree = b->p->degree, .emit = emit_coarse, .user = b },
+            b->budget))
+        return fail_memory(b);
+    int status = order_spool(b);
+    if (status == TRIP_OK)
+        status = add_levels(b);
+    if (status == TRIP_OK)
+        status = make_nodes(b);
+    join_groups(b);
+    trip_gaussian_levels_free(b->levels);
+    b->levels = NULL;
+    return status;
+}
+
+/* ---- palette ---- */
+
+/* Takes vector_room of all splats, at even distances. */
+static int take_vector(bricker *b, const unsigned char *spilled)
+{
+    const trip_gaussian *g = (const void *)(spilled + sizeof(trip_spilled));
+    const unsigned size = trip_palette_size(b->p->degree);
+    const double share = (double)b->vector_room / (double)(b->records + b->coarse);
+    b->vectors_seen++;
+    if (b->vector_count < (uint64_t)((double)b->vectors_seen * share + 1e-6))
+        memcpy(b->vectors + size * b->vector_count++, g->sh[1], size * sizeof *b->vectors);
+    return TRIP_OK;
+}
+
+static unsigned find_entry(const void *user, const unsigned char *splat)
+{
+    const bricker *b = user;
+    trip_gaussian g = { .opacity = 0 };
+    memcpy(&g, splat,
+           offsetof(trip_gaussian, sh) + (size_t)trip_sh_count(b->p->degree) * sizeof g.sh[0]);
+    return trip_palette_find(&b->palette, g.sh);
+}
+
+/* Makes the palette, and gives it to the writer if its error is small or the caller wants it. */
+static int make_palette(bricker *b)
+{
+    const trip_brick_harmonics how = b->p->harmonics;
+    const uint64_t all = b->records + b->coarse;
+    if (b->p->degree == 0 || how == TRIP_BRICK_HARMONICS_WHOLE)
+        return TRIP_OK;
+    b->vector_room = all < TRIP_PALETTE_SAMPLE_MAX ? all : TRIP_PALETTE_SAMPLE_MAX;
+    const size_t bytes = b->vector_room * trip_palette_size(b->p->degree) * sizeof *b->vectors;
+    b->vectors = trip_budget_take(b->budget, bytes);
+    if (!b->vectors)
+        return fail_memory(b);
+    int status = for_each_splat(b, all, take_vector);
+    if (status == TRIP_OK &&
+        !trip_palette_build(&b->palette, b->vectors, b->vector_count, b->p->degree,
+                            TRIP_GAUSSIAN_PALETTE_MAX, b->budget))
+        status = fail_memory(b);
+    trip_budget_release(b->budget, b->vectors, bytes);
+    b->palette_error = b->palette.error;
+    if (status == TRIP_OK &&
+        (how == TRIP_BRICK_HARMONICS_PALETTE || b->palette.error < PALETTE_ERROR))
+        trip_gaussian_writer_set_palette(b->writer,
+                                         &(trip_gaussian_palette){ .entries = b->palette.entries,
+                                                                   .count = b->palette.count,
+                                                                   .find = find_entry,
+                                                                   .user = b });
+    else
+        trip_palette_free(&b->palette);
+    return status;
+}
+
+/* ---- lists ---- */
+
+static void place_in_tree(void *user, const trip_gaussian *g, trip_spilled *head)
+{
+    bricker *b = user;
+    const uint64_t group = group_of(b, head->group, class_of(g));
+    head->group =
+        trip_gaussian_tree_leaf(&b->tree, g->centre, group_of(b, head->group, b->joined[group]));
+    head->at = g->centre[b->axis];
+    b->tree.leaves[head->group].records++;
+}
+
 static int write_axis(bricker *b, int axis)
 {
     b->axis = axis;
     b->leaf_left = 0;
-    if (!trip_gaussian_tree_build(&b->tree, &b->sample, axis, b->by_class, b->budget))
+    if (!trip_gaussian_tree_build(&b->tree, &b->sample, axis, b->groups, group_count(b), b->budget))
         return fail_memory(b);
-    const int status = trip_gaussian_sort(&(trip_gaussian_sort_params){ .spool = &b->spool,
-                                                                        .records = b->records,
-                                                                        .degree = b->p->degree,
-                                                                        .axis = axis,
-                                                                        .tree = &b->tree,
-                                                                        .folder = b->folder,
-                                                                        .path = b->p->path,
-                                                                        .emit = gather,
-                                                                        .user = b },
-                                          b->budget);
+    const int status =
+        trip_gaussian_sort(&(trip_gaussian_sort_params){ .spool = &b->spool,
+                                                         .records = b->records + b->coarse,
+                                                         .degree = b->p->degree,
+                                                         .folder = b->folder,
+                                                         .path = b->p->path,
+                                                         .place = place_in_tree,
+                                                         .emit = gather,
+                                                         .user = b },
+                           b->budget);
     trip_gaussian_tree_free(&b->tree);
     return status;
 }
@@ -321,11 +664,33 @@ static int run_bricker(bricker *b)
         status = take_sample(b);
     if (status == TRIP_OK)
         status = find_typical(b);
+    if (status == TRIP_OK)
+        status = make_levels(b);
+    if (status == TRIP_OK)
+        status = make_palette(b);
     for (int axis = 0; axis < 3 && status == TRIP_OK; axis++)
         status = write_axis(b, axis);
+    if (status < 0)
+        return status;
+    return trip_gaussian_writer_finish(b->writer, b->typical_lo, b->typical_hi);
+}
+
+static void free_bricker(bricker *b)
+{
+    trip_gaussian_writer_close(b->writer);
     trip_output_close(&b->spool);
-    return status == TRIP_OK ? trip_gaussian_writer_finish(b->writer, b->typical_lo, b->typical_hi)
-                             : status;
+    trip_output_close(&b->ordered);
+    trip_output_close(&b->merged);
+    trip_gaussian_levels_free(b->levels);
+    if (b->sample.points)
+        trip_budget_release(b->budget, b->sample.points, b->sample_bytes);
+    if (b->groups)
+        trip_budget_release(b->budget, b->groups, b->groups_bytes);
+    if (b->nodes)
+        trip_budget_release(b->budget, b->nodes, nodes_bytes(b));
+    trip_octree_free(&b->octree);
+    trip_palette_free(&b->palette);
+    free(b);
 }
 
 static size_t room_bytes(const bricker *b)
@@ -354,18 +719,22 @@ int trip_brick_gaussians(const trip_brick_gaussians_params *params, trip_budget 
     b->p = params;
     b->budget = budget;
     b->stride = trip_spilled_bytes(params->degree);
-    b->spool.fd = -1;
+    b->spool.fd = b->ordered.fd = b->merged.fd = -1;
+    b->class_lo = CLASSES;
+    for (int a = 0; a < 3; a++)
+        b->lo[a] = INFINITY, b->hi[a] = -INFINITY;
     unsigned char *room = trip_budget_take(budget, room_bytes(b));
     if (room)
         set_room(b, room);
     const int status = room ? run_bricker(b) : fail_memory(b);
     if (result)
-        *result = (trip_brick_gaussians_result){ b->records, b->dropped };
-    trip_gaussian_writer_close(b->writer);
-    if (b->sample.points)
-        trip_budget_release(budget, b->sample.points, b->sample_bytes);
+        *result = (trip_brick_gaussians_result){ .records = b->records,
+                                                 .coarse = b->coarse,
+                                                 .palette = b->palette.count,
+                                                 .palette_error = b->palette_error,
+                                                 .dropped = b->dropped };
     if (room)
         trip_budget_release(budget, room, room_bytes(b));
-    free(b);
+    free_bricker(b);
     return status;
 }

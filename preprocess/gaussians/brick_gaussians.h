@@ -13,6 +13,13 @@
  * a negative trip_status after a report. */
 typedef int trip_gaussian_source(void *user, trip_gaussian *out, size_t room, size_t *got);
 
+/* How coefficients of degree 1 and above are stored. */
+typedef enum trip_brick_harmonics {
+    TRIP_BRICK_HARMONICS_AUTO,    /* by a palette if the error of colours is below 0.5 of 255 */
+    TRIP_BRICK_HARMONICS_PALETTE, /* by the number of an entry of a palette */
+    TRIP_BRICK_HARMONICS_WHOLE,   /* each by itself */
+} trip_brick_harmonics;
+
 /* Zero means the default. */
 typedef struct trip_brick_gaussians_params {
     const char *path; /* of the data set */
@@ -21,18 +28,23 @@ typedef struct trip_brick_gaussians_params {
     void *source_user;
     const char *source_name; /* for messages; NULL means `path` */
     int degree;              /* of the spherical harmonics that are kept, 0 to 3 */
-    uint32_t flags;          /* trip_gaussian_flag (gaussian_format.h) */
-    const char *text;        /* JSON that the data set keeps; NULL means "{}" */
+    trip_brick_harmonics harmonics;
+    uint32_t flags;   /* trip_gaussian_flag (gaussian_format.h) */
+    const char *text; /* JSON that the data set keeps; NULL means "{}" */
     /* Folder for temporary files, which have no names. NULL means the new data set's folder. */
     const char *temporary;
-    /* Called now and then by the bricking thread. A scene is done when it has passed 4 times: it is
-     * read once and sorted thrice. May be NULL. */
+    /* Called now and then by the bricking thread. A scene is done when it has passed about 6 times:
+     * it is read, sorted by the octree, merged, and sorted by three axes. May be NULL. */
     void (*progress)(void *user, uint64_t passed);
     void *progress_user;
 } trip_brick_gaussians_params;
 
 typedef struct trip_brick_gaussians_result {
     uint64_t records;
+    uint64_t coarse;  /* splats of coarse levels */
+    uint64_t palette; /* entries; 0 without a palette */
+    /* Mean error of colours by the palette of the file, of 1; 0 if none was tried. */
+    double palette_error;
     uint64_t dropped; /* splats without finite values; a warning tells their number */
 } trip_brick_gaussians_result;
 

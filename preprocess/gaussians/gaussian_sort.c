@@ -1,7 +1,7 @@
 #include "gaussian_sort.h"
 
 #include "folder.h"
-#include "gaussian_code.h"
+#include "key_sort.h"
 #include "report.h"
 
 #include <stdlib.h>
@@ -60,20 +60,6 @@ static const trip_gaussian *splat(const unsigned char *spilled)
     return (const void *)(spilled + sizeof(trip_spilled));
 }
 
-static double coordinate(const sorter *s, const unsigned char *spilled)
-{
-    return splat(spilled)->centre[s->p->axis];
-}
-
-static void set_leaf(const sorter *s, unsigned char *spilled)
-{
-    const trip_gaussian *g = splat(spilled);
-    trip_spilled *h = (void *)spilled;
-    h->leaf = trip_gaussian_tree_leaf(
-        s->p->tree, g->centre, trip_gaussian_size_class(g->deviations) + TRIP_GAUSSIAN_CLASSES / 2);
-    s->p->tree->leaves[h->leaf].records++;
-}
-
 /* Reads splats into the area and sorts them by keys behind them. */
 static int sort_run(sorter *s, uint64_t first, size_t count, size_t capacity, trip_key **sorted)
 {
@@ -83,12 +69,12 @@ static int sort_run(sorter *s, uint64_t first, size_t count, size_t capacity, tr
         return status;
     for (size_t i = 0; i < count; i++) {
         unsigned char *spilled = s->area + i * s->stride;
-        set_leaf(s, spilled);
-        keys[i] = (trip_key){ trip_key_of(coordinate(s, spilled)), i };
+        s->p->place(s->p->user, splat(spilled), (void *)spilled);
+        keys[i] = (trip_key){ trip_key_of(head(spilled)->at), i };
     }
     trip_key_sort(keys, scratch, count);
     for (size_t i = 0; i < count; i++)
-        keys[i].key = head(s->area + keys[i].number * s->stride)->leaf;
+        keys[i].key = head(s->area + keys[i].number * s->stride)->group;
     trip_key_sort(keys, scratch, count);
     *sorted = keys;
     return check_interrupted(s);
@@ -139,13 +125,12 @@ static int make_runs(sorter *s, size_t capacity)
 }
 
 /* Whether the next splat of run a comes before the next of run b. */
-static bool is_before(const sorter *s, const run *a, const run *b)
+static bool is_before(const run *a, const run *b)
 {
-    const unsigned char *x = a->buffer + a->next, *y = b->buffer + b->next;
-    if (head(x)->leaf != head(y)->leaf)
-        return head(x)->leaf < head(y)->leaf;
-    const double cx = coordinate(s, x), cy = coordinate(s, y);
-    return cx != cy ? cx < cy : head(x)->number < head(y)->number;
+    const trip_spilled *x = head(a->buffer + a->next), *y = head(b->buffer + b->next);
+    if (x->group != y->group)
+        return x->group < y->group;
+    return x->at != y->at ? x->at < y->at : x->number < y->number;
 }
 
 static int fill(const sorter *s, run *r, size_t room)
@@ -159,12 +144,12 @@ static int fill(const sorter *s, run *r, size_t room)
     return status;
 }
 
-static void sift(const sorter *s, run **heap, size_t count, size_t at)
+static void sift(run **heap, size_t count, size_t at)
 {
     for (;;) {
         size_t least = at;
         for (size_t child = 2 * at + 1; child <= 2 * at + 2 && child < count; child++)
-            if (is_before(s, heap[child], heap[least]))
+            if (is_before(heap[child], heap[least]))
                 least = child;
         if (least == at)
             return;
@@ -192,7 +177,7 @@ static int merge(sorter *s, uint64_t first, size_t count, trip_output *to)
             heap[open++] = &runs[i];
     }
     for (size_t i = open; i > 0; i--)
-        sift(s, heap, open, i - 1);
+        sift(heap, open, i - 1);
     for (uint64_t n = 0; open > 0 && status == TRIP_OK; n++) {
         run *r = heap[0];
         const unsigned char *next = r->buffer + r->next;
@@ -202,7 +187,7 @@ static int merge(sorter *s, uint64_t first, size_t count, trip_output *to)
             status = fill(s, r, room);
         if (!r->filled)
             heap[0] = heap[--open];
-        sift(s, heap, open, 0);
+        sift(heap, open, 0);
         if (status == TRIP_OK && n % CHECK_EVERY == 0)
             status = check_interrupted(s);
     }

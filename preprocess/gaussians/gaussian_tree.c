@@ -8,8 +8,8 @@ typedef struct build {
     trip_gaussian_tree *tree;
     const trip_gaussian_point *points;
     trip_key *keys, *scratch;
-    int axis, class_index;
-    uint64_t slabs, tiles; /* of the class */
+    int axis;
+    uint64_t group, slabs, tiles; /* of the group */
 } build;
 
 static uint64_t sample_stride(uint64_t records)
@@ -74,7 +74,7 @@ static int64_t build_tiles(build *b, uint64_t lo, uint64_t hi, uint64_t tiles)
 {
     trip_gaussian_tree *t = b->tree;
     if (tiles == 1) {
-        t->leaves[t->leaf_count] = (trip_gaussian_leaf){ .class_index = b->class_index };
+        t->leaves[t->leaf_count] = (trip_gaussian_leaf){ .group = b->group };
         return ~(int64_t)t->leaf_count++;
     }
     const int u = (b->axis + 1) % 3, v = (b->axis + 2) % 3;
@@ -111,22 +111,22 @@ static uint64_t leaf_aim(uint64_t records)
     return (records + TRIP_GAUSSIAN_BRICK_AIM - 1) / TRIP_GAUSSIAN_BRICK_AIM;
 }
 
-static void build_classes(build *b, uint64_t count, const uint64_t records[])
+static void build_groups(build *b, uint64_t count, const uint64_t *records)
 {
     uint64_t lo = 0;
     for (uint64_t i = 0; i < count; i++)
-        b->keys[i] = (trip_key){ (uint64_t)b->points[i].class_index, i };
+        b->keys[i] = (trip_key){ b->points[i].group, i };
     trip_key_sort(b->keys, b->scratch, count);
-    for (int c = 0; c < TRIP_GAUSSIAN_CLASSES; c++) {
+    for (uint64_t group = 0; group < b->tree->groups; group++) {
         uint64_t hi = lo;
-        while (hi < count && b->points[b->keys[hi].number].class_index == c)
+        while (hi < count && b->points[b->keys[hi].number].group == group)
             hi++;
-        if (records[c]) {
-            const uint64_t slabs = (uint64_t)(cbrt((double)leaf_aim(records[c])) + 0.5);
-            b->class_index = c;
-            b->tiles = leaf_aim(records[c]);
+        if (records[group]) {
+            const uint64_t slabs = (uint64_t)(cbrt((double)leaf_aim(records[group])) + 0.5);
+            b->group = group;
+            b->tiles = leaf_aim(records[group]);
             b->slabs = slabs < 1 ? 1 : slabs;
-            b->tree->roots[c] = build_slabs(b, lo, hi, 0, b->slabs);
+            b->tree->roots[group] = build_slabs(b, lo, hi, 0, b->slabs);
         }
         lo = hi;
     }
@@ -142,24 +142,30 @@ static size_t leaves_bytes(const trip_gaussian_tree *t)
     return t->room * sizeof *t->leaves;
 }
 
+static size_t roots_bytes(const trip_gaussian_tree *t)
+{
+    return t->groups * sizeof *t->roots;
+}
+
 bool trip_gaussian_tree_build(trip_gaussian_tree *t, const trip_gaussian_sample *sample, int axis,
-                              const uint64_t records[TRIP_GAUSSIAN_CLASSES], trip_budget *budget)
+                              const uint64_t *records, uint64_t groups, trip_budget *budget)
 {
     const size_t bytes = 2 * (sample->count + 1) * sizeof(trip_key);
-    *t = (trip_gaussian_tree){ .budget = budget };
-    for (int c = 0; c < TRIP_GAUSSIAN_CLASSES; c++)
-        t->room += leaf_aim(records[c]);
+    *t = (trip_gaussian_tree){ .groups = groups, .budget = budget };
+    for (uint64_t group = 0; group < groups; group++)
+        t->room += leaf_aim(records[group]);
+    t->roots = trip_budget_take(budget, roots_bytes(t));
     t->nodes = trip_budget_take(budget, nodes_bytes(t));
     t->leaves = trip_budget_take(budget, leaves_bytes(t));
     trip_key *keys = trip_budget_take(budget, bytes);
-    const bool built = t->nodes && t->leaves && keys;
+    const bool built = t->roots && t->nodes && t->leaves && keys;
     if (built)
-        build_classes(&(build){ .tree = t,
-                                .points = sample->points,
-                                .keys = keys,
-                                .scratch = keys + sample->count + 1,
-                                .axis = axis },
-                      sample->count, records);
+        build_groups(&(build){ .tree = t,
+                               .points = sample->points,
+                               .keys = keys,
+                               .scratch = keys + sample->count + 1,
+                               .axis = axis },
+                     sample->count, records);
     trip_budget_release(budget, keys, bytes);
     if (!built)
         trip_gaussian_tree_free(t);
@@ -167,9 +173,9 @@ bool trip_gaussian_tree_build(trip_gaussian_tree *t, const trip_gaussian_sample 
 }
 
 uint64_t trip_gaussian_tree_leaf(const trip_gaussian_tree *t, const double centre[3],
-                                 int class_index)
+                                 uint64_t group)
 {
-    int64_t at = t->roots[class_index];
+    int64_t at = t->roots[group];
     while (at >= 0) {
         const trip_gaussian_node *n = &t->nodes[at];
         at = centre[n->axis] < n->value ? n->left : n->right;
@@ -179,6 +185,8 @@ uint64_t trip_gaussian_tree_leaf(const trip_gaussian_tree *t, const double centr
 
 void trip_gaussian_tree_free(trip_gaussian_tree *t)
 {
+    if (t->roots)
+        trip_budget_release(t->budget, t->roots, roots_bytes(t));
     if (t->nodes)
         trip_budget_release(t->budget, t->nodes, nodes_bytes(t));
     if (t->leaves)

@@ -1,7 +1,7 @@
-/* The division of a Gaussian scene into bricks along one axis. Slabs divide the coordinate along
- * the axis. Tiles divide a slab in the other two coordinates. A sample of the centres decides
- * where. Each class of size has bricks of its own. The division depends on the records alone. One
- * thread.
+/* The division of a Gaussian scene into bricks along one axis. Each node of the octree and each
+ * class of size in it has bricks of its own: a group. Slabs divide a group's coordinate along the
+ * axis. Tiles divide a slab in the other two coordinates. A sample of the centres decides where.
+ * The division depends on the records alone. One thread.
  */
 #ifndef TRIP_GAUSSIAN_TREE_H
 #define TRIP_GAUSSIAN_TREE_H
@@ -10,14 +10,12 @@
 #include "key_sort.h"
 
 enum {
-    TRIP_GAUSSIAN_CLASSES = 256,    /* class c has the index c + 128 */
     TRIP_GAUSSIAN_BRICK_AIM = 4096, /* records of a brick, about */
 };
 
 typedef struct trip_gaussian_point {
     double centre[3];
-    int32_t class_index;
-    int32_t reserved;
+    uint64_t group;
 } trip_gaussian_point;
 
 typedef struct trip_gaussian_sample {
@@ -34,14 +32,14 @@ typedef struct trip_gaussian_node {
 
 typedef struct trip_gaussian_leaf {
     uint64_t records; /* counted by the caller */
-    int32_t class_index, reserved;
+    uint64_t group;
 } trip_gaussian_leaf;
 
 typedef struct trip_gaussian_tree {
-    int64_t roots[TRIP_GAUSSIAN_CLASSES]; /* children, as in a node */
+    int64_t *roots; /* of the groups: children, as in a node */
     trip_gaussian_node *nodes;
-    trip_gaussian_leaf *leaves; /* by class, then slab, then tile */
-    uint64_t node_count, leaf_count, room;
+    trip_gaussian_leaf *leaves; /* by group, then slab, then tile */
+    uint64_t groups, node_count, leaf_count, room;
     trip_budget *budget;
 } trip_gaussian_tree;
 
@@ -50,11 +48,11 @@ int trip_gaussian_is_sampled(uint64_t number, uint64_t records);
 /* Returns the largest number of points in a sample of so many records. */
 uint64_t trip_gaussian_sample_room(uint64_t records);
 
-/* `records` counts the records by class index. Returns false if the budget is too small. */
+/* `records` counts the records of each group. Returns false if the budget is too small. */
 bool trip_gaussian_tree_build(trip_gaussian_tree *t, const trip_gaussian_sample *sample, int axis,
-                              const uint64_t records[TRIP_GAUSSIAN_CLASSES], trip_budget *budget);
+                              const uint64_t *records, uint64_t groups, trip_budget *budget);
 uint64_t trip_gaussian_tree_leaf(const trip_gaussian_tree *t, const double centre[3],
-                                 int class_index);
+                                 uint64_t group);
 void trip_gaussian_tree_free(trip_gaussian_tree *t);
 
 #endif

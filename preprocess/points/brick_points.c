@@ -18,7 +18,7 @@ enum {
     SPOOL_BYTES = 1 << 17,
     TILES_PER_THREAD = 4, /* tiles that are worked on at once */
     TELL_EVERY = 1 << 14,
-    PASSES = 6, /* over the cloud: read, sort, and four of trip_brick_gaussians() */
+    PASSES = 8, /* over the cloud: read, sort, and six of trip_brick_gaussians() */
 };
 
 /* No radius exceeds this part of the cloud's diagonal: FEW / sqrt(points), or LEAST. */

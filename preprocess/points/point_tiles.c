@@ -86,7 +86,7 @@ static size_t room_of_tiles(const trip_point_tiles *t)
 static void begin_tile(trip_point_tiles *t, const trip_point_row *row)
 {
     if (t->leaf_left == 0)
-        t->leaf_left = t->tree.leaves[row->head.leaf].records;
+        t->leaf_left = t->tree.leaves[row->head.group].records;
     const uint64_t pieces = (t->leaf_left + TRIP_POINT_TILE_MAX - 1) / TRIP_POINT_TILE_MAX;
     trip_point_tile *tile = &t->tiles[t->tile_count++];
     *tile = (trip_point_tile){ .first = t->passed,
@@ -115,10 +115,17 @@ static int add_row(void *user, const unsigned char *spilled)
     return trip_output_append(&t->rows, row, sizeof *row);
 }
 
+static void place_row(void *user, const trip_gaussian *row, trip_spilled *head)
+{
+    trip_point_tiles *t = user;
+    head->group = trip_gaussian_tree_leaf(&t->tree, row->centre, 0);
+    head->at = row->centre[0];
+    t->tree.leaves[head->group].records++;
+}
+
 static int sort(trip_point_tiles *t)
 {
     const trip_point_tiles_params *p = &t->params;
-    uint64_t by_class[TRIP_GAUSSIAN_CLASSES] = { p->records };
     int status = trip_output_create(&t->rows,
                                     &(trip_output_params){ .folder = p->folder,
                                                            .name = TRIP_SPOOL_NAME,
@@ -127,7 +134,7 @@ static int sort(trip_point_tiles *t)
                                     t->budget);
     if (status < 0)
         return status;
-    if (!trip_gaussian_tree_build(&t->tree, p->sample, 0, by_class, t->budget))
+    if (!trip_gaussian_tree_build(&t->tree, p->sample, 0, &p->records, 1, t->budget))
         return fail_memory(t);
     t->tiles_bytes = room_of_tiles(t);
     t->tiles = trip_budget_take(t->budget, t->tiles_bytes);
@@ -135,7 +142,7 @@ static int sort(trip_point_tiles *t)
         return fail_memory(t);
     status = trip_gaussian_sort(&(trip_gaussian_sort_params){ .spool = p->spool,
                                                               .records = p->records,
-                                                              .tree = &t->tree,
+                                                              .place = place_row,
                                                               .folder = p->folder,
                                                               .path = p->name,
                                                               .emit = add_row,

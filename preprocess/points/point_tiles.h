@@ -7,6 +7,7 @@
 #include <assert.h>
 
 #include "gaussian_sort.h"
+#include "gaussian_tree.h"
 #include "neighbours.h"
 
 enum { TRIP_POINT_TILE_MAX = 6144 };
@@ -39,7 +40,7 @@ typedef struct trip_point_tiles trip_point_tiles;
 typedef struct trip_point_tiles_params {
     const trip_output *spool; /* of trip_point_row, flushed */
     uint64_t records;
-    const trip_gaussian_sample *sample; /* of the positions, all of class index 0 */
+    const trip_gaussian_sample *sample; /* of the positions, all of group 0 */
     const char *folder;                 /* for temporary files */
     const char *name;                   /* of the cloud, for messages */
     void (*progress)(void *user, uint64_t rows);

@@ -135,23 +135,43 @@ static inline double trip_gaussian_opacity(const trip_gaussian *g, const trip_ga
     return opacity;
 }
 
+/* Sets the rows of the Jacobian at a footprint's position and depth. */
+static inline void trip_gaussian_jacobian(const trip_camera *c, trip_gaussian_shape shape,
+                                          const trip_gaussian_footprint *f, trip_vec3 *jx,
+                                          trip_vec3 *jy)
+{
+    const bool limited = shape == TRIP_GAUSSIAN_PROJECTED;
+    *jx = c->to_x;
+    *jy = c->to_y;
+    if (c->ortho)
+        return;
+    const double w = 0.5 * c->width, h = 0.5 * c->height, clamp = TRIP_GAUSSIAN_CLAMP;
+    const double x = !limited ? f->x : fmin(w * (1 + clamp), fmax(w * (1 - clamp), f->x));
+    const double y = !limited ? f->y : fmin(h * (1 + clamp), fmax(h * (1 - clamp), f->y));
+    *jx = trip_scale(trip_sub(*jx, trip_scale(c->forward, x)), 1 / f->z);
+    *jy = trip_scale(trip_sub(*jy, trip_scale(c->forward, y)), 1 / f->z);
+}
+
+/* Sets the rows of J R diag(deviations). */
+static inline void trip_gaussian_to_picture(const trip_camera *c, const trip_gaussian *g,
+                                            trip_gaussian_shape shape,
+                                            const trip_gaussian_footprint *f, trip_vec3 *a,
+                                            trip_vec3 *b)
+{
+    trip_vec3 jx, jy;
+    trip_gaussian_jacobian(c, shape, f, &jx, &jy);
+    const trip_vec3 deviations = trip_gaussian_deviations(g);
+    *a = trip_vec3_times(trip_gaussian_to_axes(g, jx), deviations);
+    *b = trip_vec3_times(trip_gaussian_to_axes(g, jy), deviations);
+}
+
 /* Sets the shape and the opacity of a footprint from its position. Returns false if nothing of it
  * counts. */
 static inline bool trip_gaussian_project(const trip_camera *c, const trip_gaussian_settings *s,
                                          const trip_gaussian *g, trip_gaussian_footprint *f)
 {
-    const bool limited = s->shape == TRIP_GAUSSIAN_PROJECTED;
-    trip_vec3 jx = c->to_x, jy = c->to_y;
-    if (!c->ortho) {
-        const double w = 0.5 * c->width, h = 0.5 * c->height, clamp = TRIP_GAUSSIAN_CLAMP;
-        const double x = !limited ? f->x : fmin(w * (1 + clamp), fmax(w * (1 - clamp), f->x));
-        const double y = !limited ? f->y : fmin(h * (1 + clamp), fmax(h * (1 - clamp), f->y));
-        jx = trip_scale(trip_sub(jx, trip_scale(c->forward, x)), 1 / f->z);
-        jy = trip_scale(trip_sub(jy, trip_scale(c->forward, y)), 1 / f->z);
-    }
-    const trip_vec3 deviations = trip_gaussian_deviations(g);
-    const trip_vec3 a = trip_vec3_times(trip_gaussian_to_axes(g, jx), deviations);
-    const trip_vec3 b = trip_vec3_times(trip_gaussian_to_axes(g, jy), deviations);
+    trip_vec3 a, b;
+    trip_gaussian_to_picture(c, g, s->shape, f, &a, &b);
     /* The determinant of a sum has no cancellation in this form. */
     const double xx = trip_dot(a, a), xy = trip_dot(a, b), yy = trip_dot(b, b);
     const double bare = trip_dot(trip_cross(a, b), trip_cross(a, b)), add = TRIP_GAUSSIAN_LOW_PASS;
@@ -159,7 +179,7 @@ static inline bool trip_gaussian_project(const trip_camera *c, const trip_gaussi
     double opacity = trip_gaussian_opacity(g, s);
     if (s->shape == TRIP_GAUSSIAN_EWA)
         opacity *= sqrt(bare / filtered);
-    else if (s->antialiased)
+    else if (s->antialiased || g->antialiased)
         opacity *= sqrt(fmax(TRIP_GAUSSIAN_COMPENSATION_MIN, bare / filtered));
     if (!trip_gaussian_set_opacity(f, opacity))
         return false;
@@ -172,20 +192,42 @@ static inline bool trip_gaussian_project(const trip_camera *c, const trip_gaussi
     return true;
 }
 
+/* Returns a footprint with the position of a Gaussian alone. */
+static inline trip_gaussian_footprint trip_gaussian_position(const trip_camera *c,
+                                                             const trip_gaussian *g)
+{
+    const trip_vec3 from_eye = trip_sub(trip_v3(g->centre[0], g->centre[1], g->centre[2]), c->eye);
+    const double z = trip_dot(c->forward, from_eye), by = c->ortho ? 1 : z;
+    return (trip_gaussian_footprint){ .x = trip_dot(c->to_x, from_eye) / by,
+                                      .y = trip_dot(c->to_y, from_eye) / by,
+                                      .z = z };
+}
+
 /* Computes the footprint of a Gaussian. Returns false if the Gaussian is not drawn, whether it
  * meets the picture or not. */
 static inline bool trip_gaussian_footprint_of(const trip_camera *c, const trip_gaussian_settings *s,
                                               const trip_gaussian *g, trip_gaussian_footprint *f)
 {
     const trip_vec3 centre = trip_v3(g->centre[0], g->centre[1], g->centre[2]);
-    const trip_vec3 from_eye = trip_sub(centre, c->eye);
     if (!trip_gaussian_is_drawn(c, s, centre))
         return false;
-    const double z = trip_dot(c->forward, from_eye), by = c->ortho ? 1 : z;
-    *f = (trip_gaussian_footprint){ .x = trip_dot(c->to_x, from_eye) / by,
-                                    .y = trip_dot(c->to_y, from_eye) / by,
-                                    .z = z };
+    *f = trip_gaussian_position(c, g);
     return trip_gaussian_project(c, s, g, f);
+}
+
+/* Returns the share of its opacity that a drawn Gaussian keeps, so that the low-pass filter does
+ * not change the light that it blocks. */
+static inline double trip_gaussian_compensation(const trip_camera *c, const trip_gaussian *g)
+{
+    const trip_gaussian_footprint f = trip_gaussian_position(c, g);
+    const double add = TRIP_GAUSSIAN_LOW_PASS;
+    trip_vec3 a, b;
+    if (!(f.z > 0))
+        return 1;
+    trip_gaussian_to_picture(c, g, TRIP_GAUSSIAN_PROJECTED, &f, &a, &b);
+    const trip_vec3 cross = trip_cross(a, b);
+    const double bare = trip_dot(cross, cross);
+    return sqrt(bare / (bare + add * (trip_dot(a, a) + trip_dot(b, b)) + add * add));
 }
 
 /* Returns the squared radius q at d = (dx, dy) from the centre. */

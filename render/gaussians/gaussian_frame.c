@@ -5,6 +5,10 @@
 #include <string.h>
 
 #include "clock.h"
+#include "gaussian_footprint.h"
+#include "gaussian_integral.h"
+#include "gaussian_keys.h"
+#include "gaussian_sheet_frame.h"
 #include "gaussians_cpu.h"
 #include "gaussians_reference.h"
 #include "normalise.h"
@@ -17,7 +21,7 @@ enum { BATCH = 1024, LAYERS_MAX = 3, WAYS = 2 };
 
 /* One stream and its next Gaussians. */
 typedef struct source {
-    trip_gaussian_stream *stream;
+    trip_placed_stream *stream;
     trip_gaussian *batch;
     double *keys;
     size_t at, count;
@@ -32,15 +36,20 @@ typedef struct layer {
 
 struct trip_gaussian_frame {
     trip_gaussian_frame_params params;
+    /* Draw the frame if they are not NULL. */
+    trip_gaussian_integral *integral;
+    trip_gaussian_sheet_frame *sheets;
     trip_settings weights; /* of the order by lists */
-    trip_settings light;   /* on surfels, if `shading` */
     int axis_of_view;
     layer layers[LAYERS_MAX];
     unsigned layer_count, drawn; /* layers; those that are complete */
     source sources[WAYS];
-    unsigned source_count; /* of the layer that is drawn; 0 until its streams are open */
-    trip_gaussian *batch;  /* in order, of all sources */
-    float *picture;        /* of one layer, with distances behind it; NULL for one layer */
+    unsigned source_count;  /* of the layer that is drawn; 0 until its streams are open */
+    uint64_t planned, seen; /* Gaussians in the streams of this layer; those drawn */
+    trip_gaussian *batch;   /* in order, of all sources */
+    double stop;            /* the order by depth pauses at this key */
+    bool paused;            /* the next Gaussian has a key from `stop` on */
+    float *picture;         /* of one layer, with distances behind it; NULL for one layer */
     trip_gaussian_frame_stats stats;
 };
 
@@ -88,6 +97,7 @@ static int begin_layer(trip_gaussian_frame *f, layer *l)
                                                  .settings = &settings,
                                                  .budget = p->budget,
                                                  .runner = &p->runner,
+                                                 .device = p->device,
                                              });
 }
 
@@ -114,85 +124,39 @@ static int add_to_layer(layer *l, const trip_gaussian *batch, size_t count)
                   : trip_gaussians_reference_add(l->reference, batch, count);
 }
 
+static int end_layer(layer *l)
+{
+    return l->cpu ? trip_gaussians_cpu_flush(l->cpu) : 0;
+}
+
 static bool is_closed(const layer *l)
 {
     return l->cpu && trip_gaussians_cpu_open_tiles(l->cpu) == 0;
 }
 
-static void take_layer(const layer *l, float *rgba, float *depth)
+static int take_layer(const layer *l, float *rgba, float *depth)
 {
     if (l->cpu)
-        trip_gaussians_cpu_picture(l->cpu, rgba, depth);
-    else
-        trip_gaussians_reference_picture(l->reference, rgba, depth);
+        return trip_gaussians_cpu_picture(l->cpu, rgba, depth);
+    trip_gaussians_reference_picture(l->reference, rgba, depth);
+    return 0;
 }
 
 /* ---- streams ---- */
 
-static void put(double to[3], trip_vec3 v)
-{
-    to[0] = v.x;
-    to[1] = v.y;
-    to[2] = v.z;
-}
-
-static trip_gaussian_view view_of(const trip_camera *c)
-{
-    const trip_camera_params *p = &c->params;
-    const trip_vec3 forward = trip_normalize(trip_sub(p->look, p->eye));
-    const trip_vec3 right = trip_normalize(trip_cross(forward, p->up));
-    const double half = c->ortho ? p->ortho_height / 2 : tan(p->fov_degrees * (M_PI / 360));
-    trip_gaussian_view v = {
-        .parallel = c->ortho,
-        .half_width = half * c->width / c->height,
-        .half_height = half,
-        .width_px = (unsigned)c->width,
-        .height_px = (unsigned)c->height,
-    };
-    put(v.eye, p->eye);
-    put(v.right, right);
-    put(v.down, trip_cross(forward, right));
-    put(v.forward, forward);
-    return v;
-}
-
-/* Sets the planes of the view's sides, and the nearest plane that shows a centre. */
-static unsigned find_planes(const trip_camera *c, trip_gaussian_plane planes[])
-{
-    const trip_gaussian_view v = view_of(c);
-    trip_gaussian_view_planes(&v, planes);
-    trip_gaussian_plane *near = &planes[TRIP_GAUSSIAN_SIDES];
-    *near = (trip_gaussian_plane){ .offset = c->ortho ? 0 : -0.99 * TRIP_GAUSSIAN_NEAR };
-    for (int a = 0; a < 3; a++) {
-        near->normal[a] = v.forward[a];
-        near->offset -= v.forward[a] * v.eye[a];
-    }
-    return TRIP_GAUSSIAN_SIDES + 1;
-}
-
-/* The key of a list: the coordinate relative to the eye, in one direction. */
-static trip_gaussian_key key_of_list(const trip_camera *c, int axis, int way)
-{
-    trip_gaussian_key key = { .offset = -way * trip_component(c->eye, axis) };
-    key.direction[axis] = way;
-    return key;
-}
-
-static trip_gaussian_key key_of_depth(const trip_camera *c)
-{
-    trip_gaussian_key key = { .offset = -trip_dot(c->forward, c->eye) };
-    put(key.direction, c->forward);
-    return key;
-}
-
 static int open_stream(trip_gaussian_frame *f, const trip_gaussian_stream_params *params)
 {
-    trip_gaussian_stream **out = &f->sources[f->source_count].stream;
-    int status = trip_gaussian_stream_open(out, f->params.set, params, f->params.budget);
+    const trip_gaussian_frame_params *of = &f->params;
+    trip_placed_stream **out = &f->sources[f->source_count].stream;
+    int status =
+        trip_placed_stream_open(out, of->sets, of->set_count, params, of->drawn, of->budget);
     if (status)
         return status;
-    const trip_gaussian_plan *plan = trip_gaussian_stream_planned(*out);
+    const trip_gaussian_plan *plan = trip_placed_stream_planned(*out);
     f->stats.bricks += plan->bricks;
+    f->planned += plan->records;
+    f->stats.planned += plan->records;
+    f->stats.coarse += plan->coarse_records;
     if (plan->window_records > f->stats.window_records)
         f->stats.window_records = plan->window_records;
     f->sources[f->source_count].at = f->sources[f->source_count].count = 0;
@@ -209,22 +173,25 @@ static int open_streams(trip_gaussian_frame *f, const layer *l)
     trip_gaussian_stream_params p = {
         .axis = l->axis,
         .planes = planes,
-        .plane_count = find_planes(c, planes),
+        .plane_count = trip_gaussian_planes_of(c, planes),
+        .lod = trip_gaussian_lod_of(c, f->params.lod_px),
         .degree = f->params.settings.degree,
     };
     f->source_count = 0;
+    f->planned = f->seen = 0;
     if (!f->params.by_lists) {
-        p.key = key_of_depth(c);
+        p.key = trip_gaussian_key_of_depth(c);
         return open_stream(f, &p);
     }
     if (c->ortho) {
-        p.key = key_of_list(c, l->axis, trip_ray_goes(c->r0, l->axis) == TRIP_WAY_UP ? 1 : -1);
+        p.key = trip_gaussian_key_of_list(c, l->axis,
+                                          trip_ray_goes(c->r0, l->axis) == TRIP_WAY_UP ? 1 : -1);
         return open_stream(f, &p);
     }
     p.key_max = DBL_MAX;
-    p.key = key_of_list(c, l->axis, 1);
+    p.key = trip_gaussian_key_of_list(c, l->axis, 1);
     int status = open_stream(f, &p);
-    p.key = key_of_list(c, l->axis, -1);
+    p.key = trip_gaussian_key_of_list(c, l->axis, -1);
     p.key_min = DBL_TRUE_MIN; /* a key of 0 is in the first stream */
     return status ? status : open_stream(f, &p);
 }
@@ -232,18 +199,31 @@ static int open_streams(trip_gaussian_frame *f, const layer *l)
 static void close_streams(trip_gaussian_frame *f)
 {
     for (int i = 0; i < WAYS; i++) {
-        trip_gaussian_stream_close(f->sources[i].stream);
+        trip_placed_stream_close(f->sources[i].stream);
         f->sources[i].stream = NULL;
     }
     f->source_count = 0;
 }
 
+/* A Gaussian of a coarse level blocks the same light as without the low-pass filter. Its opacity
+ * above 1/255 counts, since drawing leaves out the rest. */
+static void compensate(const trip_gaussian_frame *f, trip_gaussian *g)
+{
+    const trip_gaussian_settings *s = &f->params.settings;
+    const float least = (float)TRIP_GAUSSIAN_ALPHA_MIN;
+    if (g->merged && g->opacity > least && !s->antialiased && !g->antialiased &&
+        s->shape != TRIP_GAUSSIAN_EWA)
+        g->opacity =
+            least + (g->opacity - least) * (float)trip_gaussian_compensation(f->params.camera, g);
+}
+
 static int fill(const trip_gaussian_frame *f, source *s)
 {
     s->at = s->count = 0;
-    const int status = trip_gaussian_stream_next(s->stream, s->batch, s->keys, BATCH, &s->count);
-    if (!status && f->light.shading)
-        trip_surfel_light(&f->light, f->params.camera, s->batch, s->count);
+    const int status = trip_placed_stream_next(s->stream, s->batch, s->keys, BATCH, &s->count);
+    for (size_t i = 0; i < s->count; i++)
+        compensate(f, &s->batch[i]);
+    trip_surfel_light(f->params.settings.light, f->params.camera, s->batch, s->count);
     return status;
 }
 
@@ -261,9 +241,12 @@ static int take_batch(trip_gaussian_frame *f, const trip_gaussian **batch, size_
     if (!status && f->source_count > 1 && !has_any(b))
         status = fill(f, b);
     if (status || f->source_count == 1) {
-        *batch = a->batch;
-        *count = status ? 0 : a->count;
-        a->at = a->count;
+        const size_t first = a->at;
+        while (!status && has_any(a) && a->keys[a->at] < f->stop)
+            a->at++;
+        *batch = a->batch + first;
+        *count = a->at - first;
+        f->paused = !status && !*count && has_any(a);
     } else {
         *batch = f->batch;
         *count = 0;
@@ -278,7 +261,84 @@ static int take_batch(trip_gaussian_frame *f, const trip_gaussian **batch, size_
     return status;
 }
 
+/* ---- the integral ---- */
+
+static int begin_integral(trip_gaussian_frame *f)
+{
+    const trip_gaussian_frame_params *p = &f->params;
+    return trip_gaussian_integral_begin(&f->integral, &(trip_gaussian_integral_params){
+                                                          .sets = p->sets,
+                                                          .set_count = p->set_count,
+                                                          .drawn = p->drawn,
+                                                          .camera = p->camera,
+                                                          .settings = p->settings,
+                                                          .tolerance = p->tolerance,
+                                                          .budget = p->budget,
+                                                          .runner = p->runner,
+                                                      });
+}
+
+static trip_gaussian_frame_stats stats_of_integral(const trip_gaussian_frame *f)
+{
+    const trip_gaussian_integral_stats s = trip_gaussian_integral_get_stats(f->integral);
+    return (trip_gaussian_frame_stats){
+        .gaussians = s.gaussians,
+        .bricks = s.bricks,
+        .bytes_read = s.bytes_read,
+        .window_records = s.window_records,
+        .draw_ms = s.draw_ms,
+        .read_ms = s.read_ms,
+        .merge_ms = f->stats.merge_ms,
+    };
+}
+
+/* ---- sheets ---- */
+
+static int begin_sheets(trip_gaussian_frame *f)
+{
+    const trip_gaussian_frame_params *p = &f->params;
+    return trip_gaussian_sheet_frame_begin(&f->sheets, &(trip_gaussian_sheet_frame_params){
+                                                           .set = p->sets->set,
+                                                           .camera = p->camera,
+                                                           .settings = p->settings,
+                                                           .weights = &f->weights,
+                                                           .thickness = p->sheet,
+                                                           .reference = p->reference,
+                                                           .budget = p->budget,
+                                                           .runner = p->runner,
+                                                       });
+}
+
+static trip_gaussian_frame_stats stats_of_sheets(const trip_gaussian_frame *f)
+{
+    const trip_gaussian_sheet_frame_stats s = trip_gaussian_sheet_frame_get_stats(f->sheets);
+    return (trip_gaussian_frame_stats){
+        .gaussians = s.gaussians,
+        .bricks = s.bricks,
+        .bytes_read = s.bytes_read,
+        .window_records = s.held_records,
+        .layers = s.passes,
+        .draw_ms = s.draw_ms,
+        .read_ms = s.read_ms,
+        .merge_ms = f->stats.merge_ms,
+    };
+}
+
 /* ---- the frame ---- */
+
+static int begin_layers_and_streams(trip_gaussian_frame *f)
+{
+    int status = take_memory(f) ? 0
+                                : trip_fail(TRIP_ERROR, "render", "memory",
+                                            "the layers do not fit; raise --memory or draw a "
+                                            "smaller picture");
+    if (!status)
+        status = begin_layers(f);
+    if (!status)
+        status = open_streams(f, f->layers);
+    f->stats.layers = f->layer_count;
+    return status;
+}
 
 int trip_gaussian_frame_begin(trip_gaussian_frame **out, const trip_gaussian_frame_params *params)
 {
@@ -289,22 +349,25 @@ int trip_gaussian_frame_begin(trip_gaussian_frame **out, const trip_gaussian_fra
     f->axis_of_view = trip_weight_axis_of_view(params->camera);
     if (params->by_lists)
         f->weights = *params->by_lists;
-    if (params->light)
-        f->light = *params->light;
-    int status = take_memory(f) ? 0
-                                : trip_fail(TRIP_ERROR, "render", "memory",
-                                            "the layers do not fit; raise --memory or draw a "
-                                            "smaller picture");
-    if (!status)
-        status = begin_layers(f);
-    if (!status)
-        status = open_streams(f, f->layers);
-    f->stats.layers = f->layer_count;
+    const int status = params->integral    ? begin_integral(f)
+                       : params->sheet > 0 ? begin_sheets(f)
+                                           : begin_layers_and_streams(f);
     if (!status)
         return 0;
     trip_gaussian_frame_end(f);
     *out = NULL;
     return status;
+}
+
+/* Two streams of a layer plan some bricks twice, and may leave out some of their Gaussians. */
+static double share_done(const trip_gaussian_frame *f)
+{
+    double all = 0;
+    for (unsigned i = 0; i < f->params.set_count; i++)
+        all += (double)f->params.sets[i].set->header.records;
+    const double planned = fmin((double)f->planned, all);
+    const double part = planned > 0 ? fmin((double)f->seen / planned, 1) : 0;
+    return (f->drawn + part) / f->layer_count;
 }
 
 /* Draws one batch. Opens the streams of the next layer once a layer is complete. */
@@ -319,28 +382,45 @@ static int draw_batch(trip_gaussian_frame *f)
     const double begun = trip_now_ms();
     if (!status && count)
         status = add_to_layer(l, batch, count);
+    else if (!status)
+        status = end_layer(l);
     f->stats.draw_ms += trip_now_ms() - begun;
     f->stats.gaussians += count;
-    if (status || count)
+    f->seen += count;
+    f->stats.done = share_done(f);
+    if (status || count || f->paused)
         return status;
     for (unsigned i = 0; i < f->source_count; i++)
-        f->stats.bytes_read += trip_gaussian_stream_planned(f->sources[i].stream)->read_bytes;
+        f->stats.bytes_read += trip_placed_stream_planned(f->sources[i].stream)->read_bytes;
     close_streams(f);
     f->drawn++;
+    f->planned = f->seen = 0;
+    f->stats.done = share_done(f);
     return 0;
+}
+
+int trip_gaussian_frame_step_to(trip_gaussian_frame *f, double depth, uint64_t deadline_ns)
+{
+    int status = 0;
+    if (f->integral)
+        return trip_gaussian_integral_step(f->integral, deadline_ns);
+    if (f->sheets)
+        return trip_gaussian_sheet_frame_step(f->sheets, deadline_ns);
+    f->stop = depth;
+    f->paused = false;
+    while (!status && f->drawn < f->layer_count && !f->paused) {
+        status = draw_batch(f);
+        if (!status)
+            status = trip_frame_poll();
+        if (!status && f->drawn < f->layer_count && !f->paused && trip_now_ns() >= deadline_ns)
+            return TRIP_FRAME_MORE;
+    }
+    return status ? status : TRIP_FRAME_DONE;
 }
 
 int trip_gaussian_frame_step(trip_gaussian_frame *f, uint64_t deadline_ns)
 {
-    int status = 0;
-    while (!status && f->drawn < f->layer_count) {
-        status = draw_batch(f);
-        if (!status)
-            status = trip_frame_poll();
-        if (!status && f->drawn < f->layer_count && trip_now_ns() >= deadline_ns)
-            return TRIP_FRAME_MORE;
-    }
-    return status ? status : TRIP_FRAME_DONE;
+    return trip_gaussian_frame_step_to(f, INFINITY, deadline_ns);
 }
 
 /* Adds w^2 times a layer to the sums. Distances are weighted by opacity too, as in layer.h. */
@@ -367,35 +447,41 @@ static void add_layer(const trip_gaussian_frame *f, const layer *l, float *rgba,
 }
 
 /* Merges the layers drawn so far. */
-static void merge(trip_gaussian_frame *f, float *rgba, float *depth)
+static int merge(trip_gaussian_frame *f, float *rgba, float *depth)
 {
+    int status = 0;
     const size_t pixels = pixels_of(f);
     memset(rgba, 0, 4 * pixels * sizeof *rgba);
     if (depth)
         memset(depth, 0, pixels * sizeof *depth);
-    for (unsigned i = 0; i < f->layer_count; i++) {
-        take_layer(&f->layers[i], f->picture, depth ? f->picture + 4 * pixels : NULL);
-        add_layer(f, &f->layers[i], rgba, depth);
+    for (unsigned i = 0; i < f->layer_count && !status; i++) {
+        status = take_layer(&f->layers[i], f->picture, depth ? f->picture + 4 * pixels : NULL);
+        if (!status)
+            add_layer(f, &f->layers[i], rgba, depth);
     }
     for (size_t i = 0; depth && i < pixels; i++)
         depth[i] = rgba[4 * i + 3] > 0 ? depth[i] / rgba[4 * i + 3] : INFINITY;
     trip_put_behind(rgba, pixels, f->params.settings.background);
+    return status;
 }
 
 int trip_gaussian_frame_picture(trip_gaussian_frame *f, float *rgba, float *depth)
 {
     const double begun = trip_now_ms();
-    if (f->params.by_lists)
-        merge(f, rgba, depth);
+    int status = 0;
+    if (f->integral)
+        trip_gaussian_integral_picture(f->integral, rgba);
+    else if (f->sheets)
+        trip_gaussian_sheet_frame_picture(f->sheets, rgba, depth);
     else
-        take_layer(f->layers, rgba, depth);
+        status = f->params.by_lists ? merge(f, rgba, depth) : take_layer(f->layers, rgba, depth);
     f->stats.merge_ms += trip_now_ms() - begun;
-    return 0;
+    return status;
 }
 
 trip_gaussian_frame_stats trip_gaussian_frame_get_stats(const trip_gaussian_frame *f)
 {
-    return f->stats;
+    return f->integral ? stats_of_integral(f) : f->sheets ? stats_of_sheets(f) : f->stats;
 }
 
 void trip_gaussian_frame_end(trip_gaussian_frame *f)
@@ -403,6 +489,8 @@ void trip_gaussian_frame_end(trip_gaussian_frame *f)
     if (!f)
         return;
     trip_budget *budget = f->params.budget;
+    trip_gaussian_integral_end(f->integral);
+    trip_gaussian_sheet_frame_end(f->sheets);
     close_streams(f);
     for (unsigned i = 0; i < f->layer_count; i++) {
         trip_gaussians_cpu_end(f->layers[i].cpu);

@@ -1,41 +1,55 @@
-/* Draws one picture of a Gaussian scene, in steps: streams its Gaussians in the order of drawing,
- * composites them into layers, and merges the layers.
+/* Draws one picture of placed Gaussian scenes, in steps: streams their Gaussians in the order of
+ * drawing, composites them into layers, and merges the layers.
  *
  * - The order by depth has one layer. Its Gaussians come in the order of the centres' view depth.
  * - The order by lists has a layer for each axis with weight in the picture. Its Gaussians come in
  *   the order of their coordinate along the axis, outwards from the eye. Layers are merged with
  *   w^2 (equation 3 of Hofsetz, Max & Bastos 2008; weight.h).
+ * - The order by sheets lets Gaussians overlap (gaussian_sheets.h).
+ * - The integral has neither order nor layers (gaussian_integral.h).
  *
  * A layer ends early once no pixel takes more. One thread; the runner lends others. */
 #ifndef TRIP_GAUSSIAN_FRAME_H
 #define TRIP_GAUSSIAN_FRAME_H
 
 #include "gaussian_picture.h"
-#include "gaussian_stream.h"
+#include "gaussian_tiles.h"
+#include "placed_stream.h"
 #include "settings.h"
 #include "task_runner.h"
 
 typedef struct trip_gaussian_frame trip_gaussian_frame;
 
-/* The set and the camera must outlive the frame. */
+/* The sets and the camera must outlive the frame. */
 typedef struct trip_gaussian_frame_params {
-    const trip_gaussian_set *set;
-    const trip_camera *camera; /* index space is the scene's space */
+    const trip_placed_set *sets;
+    unsigned set_count;
+    uint64_t *drawn;           /* Gaussians of each set, added up; NULL: not counted */
+    const trip_camera *camera; /* index space is the common space of the sets */
     trip_gaussian_settings settings;
-    /* For the order by lists: its method and h. NULL: by depth. */
+    /* For the orders by lists and by sheets: their method and h. NULL: by depth. */
     const trip_settings *by_lists;
-    /* The light on surfels; NULL: none. Index space of the camera is world space. */
-    const trip_settings *light;
-    bool reference; /* draws in double precision, without threads */
+    double sheet; /* thickness of the sheets, in units of the scene; 0: not by sheets */
+    /* Width in pixels of the voxels that coarse Gaussians may stand for; 0: none do. Sheets and the
+     * integral have none. */
+    double lod_px;
+    bool reference;   /* draws in double precision, without threads */
+    bool integral;    /* has no order */
+    double tolerance; /* of the integral; 0 means the default */
+    /* Composites in place of the CPU; NULL for none. It must outlive the frame. */
+    const trip_tile_device *device;
     trip_budget *budget;
     trip_task_runner runner;
 } trip_gaussian_frame_params;
 
 typedef struct trip_gaussian_frame_stats {
     uint64_t gaussians; /* drawn from the streams, over all layers */
+    uint64_t planned;   /* in the plans of the streams */
+    uint64_t coarse;    /* in the plans, of coarse levels */
     uint64_t bricks, bytes_read;
-    uint64_t window_records; /* room in the largest window */
+    uint64_t window_records; /* room in the largest window, or Gaussians that meet a sheet */
     unsigned layers;
+    double done; /* share of the frame, 0 to 1 */
     double draw_ms, read_ms, merge_ms;
 } trip_gaussian_frame_stats;
 
@@ -44,6 +58,8 @@ int trip_gaussian_frame_begin(trip_gaussian_frame **out, const trip_gaussian_fra
 /* Draws until the deadline (CLOCK_MONOTONIC), and at least one batch. Returns TRIP_FRAME_DONE or
  * TRIP_FRAME_MORE (renderer.h), or a failure. */
 int trip_gaussian_frame_step(trip_gaussian_frame *f, uint64_t deadline_ns);
+/* Draws in the order by depth up to `depth` (camera.h). Later Gaussians wait. */
+int trip_gaussian_frame_step_to(trip_gaussian_frame *f, double depth, uint64_t deadline_ns);
 /* Writes the picture drawn so far: width * height * 4 floats, premultiplied, row 0 at the top, over
  * the background. With settings.depth also width * height distances; otherwise `depth` is NULL. */
 int trip_gaussian_frame_picture(trip_gaussian_frame *f, float *rgba, float *depth);

@@ -14,6 +14,7 @@ enum {
     BATCH_MIN = 512,
     PAIRS_PER_GAUSSIAN = 8, /* room for the tiles that a batch meets */
     PROJECT_TASK = 256,     /* Gaussians of a task */
+    STRIP_BYTES = 1 << 20,  /* planes that a device writes at once, approximately */
 };
 
 /* Rounding must not end a pixel after two Gaussians of the greatest opacity: T is then 1e-4, which
@@ -37,17 +38,22 @@ struct trip_gaussians_cpu {
     trip_budget *budget;
     trip_task_runner runner;
     const trip_tile_kernels *kernels;
+    const trip_tile_device *device; /* composites in place of the kernels; or NULL */
+    trip_tiles *on_device;
     int columns, rows; /* of tiles */
     size_t tiles;
-    size_t tile_floats; /* of a tile's planes */
-    size_t tile_task;   /* tiles of a task */
+    size_t tile_floats;  /* of a tile's planes */
+    size_t tile_task;    /* tiles of a task */
+    size_t planes_tiles; /* tiles in `planes`: strip_rows rows */
+    int strip_rows;      /* rows that a device writes at once; without a device all rows */
     float *planes;
     uint16_t *open; /* for each tile, see trip_tile_kernels.draw */
 
     /* A batch, and the pieces of it that fit the lists. */
     size_t batch_max, curves_max, pairs_max;
-    const trip_gaussian *gaussians;
-    size_t batch;
+    size_t batch;                   /* Gaussians that are projected */
+    const trip_gaussian *gaussians; /* the next ones to project */
+    size_t next;
     trip_projected *splats;
     trip_curve *curves; /* NULL unless footprints are exact */
     tile_span *spans;
@@ -60,11 +66,16 @@ struct trip_gaussians_cpu {
     trip_gaussians_cpu_stats stats;
 };
 
+static float termination_of(const trip_gaussians_cpu *g)
+{
+    return (float)(trip_gaussian_termination(&g->settings) * (1 - TERMINATION_SLACK));
+}
+
 /* ---- memory ---- */
 
 /* The fields of `g` that are buffers, and their sizes in bytes. */
 #define BUFFERS(X)                                                                                 \
-    X(g->planes, g->tiles * g->tile_floats * sizeof(float))                                        \
+    X(g->planes, g->planes_tiles * g->tile_floats * sizeof(float))                                 \
     X(g->open, g->tiles * sizeof(uint16_t))                                                        \
     X(g->row_first, ((size_t)g->rows + 1) * sizeof(size_t))                                        \
     X(g->row_pairs, ((size_t)g->rows + 1) * sizeof(size_t))                                        \
@@ -91,7 +102,26 @@ static void *take(trip_gaussians_cpu *g, size_t bytes, bool *all)
     return memory;
 }
 
-static bool take_buffers(trip_gaussians_cpu *g, size_t batch_max)
+/* Returns 0, a failure, or 1 if the memory does not suffice. */
+static int begin_on_device(trip_gaussians_cpu *g)
+{
+    if (!g->device)
+        return 0;
+    const trip_tiles_params params = {
+        .width = g->camera.width,
+        .height = g->camera.height,
+        .splats_max = g->batch_max,
+        .pairs_max = g->pairs_max,
+        .curved = g->curves_max > 0,
+        .depth = g->settings.depth,
+        .termination = termination_of(g),
+        .budget = g->budget,
+    };
+    return g->device->begin(g->device->user, &g->on_device, &params);
+}
+
+/* Returns 0, a failure, or 1 if the memory does not suffice. */
+static int take_buffers(trip_gaussians_cpu *g, size_t batch_max)
 {
     bool all = true;
     g->batch_max = batch_max;
@@ -102,17 +132,20 @@ static bool take_buffers(trip_gaussians_cpu *g, size_t batch_max)
 #define TAKE(field, bytes) field = take(g, bytes, &all);
     BUFFERS(TAKE)
 #undef TAKE
-    if (!all)
+    const int status = all ? begin_on_device(g) : 1;
+    if (status)
         release_buffers(g);
-    return all;
+    return status;
 }
 
-static bool take_what_fits(trip_gaussians_cpu *g)
+/* Returns 0, a failure, or 1 if the memory does not suffice. */
+static int take_what_fits(trip_gaussians_cpu *g)
 {
-    for (size_t batch_max = BATCH_MAX; batch_max >= BATCH_MIN; batch_max /= 2)
-        if (take_buffers(g, batch_max))
-            return true;
-    return false;
+    int status = 1;
+    size_t batch_max = g->device ? g->device->batch_max : BATCH_MAX;
+    for (; batch_max >= BATCH_MIN && status > 0; batch_max /= 2)
+        status = take_buffers(g, batch_max);
+    return status;
 }
 
 static int clamped(int at, int max)
@@ -138,6 +171,23 @@ static void clear_tile(trip_gaussians_cpu *g, size_t tile)
         }
 }
 
+/* The device has cleared its own planes. */
+static void clear_tiles(trip_gaussians_cpu *g)
+{
+    if (g->device)
+        memset(g->open, 0xff, g->tiles * sizeof *g->open);
+    for (size_t i = 0; i < g->tiles && !g->device; i++)
+        clear_tile(g, i);
+}
+
+/* Sets how many rows of tiles the planes hold. */
+static void size_planes(trip_gaussians_cpu *g)
+{
+    const size_t row_bytes = (size_t)g->columns * g->tile_floats * sizeof(float);
+    g->strip_rows = g->device ? clamped(1 + (int)(STRIP_BYTES / row_bytes), g->rows) : g->rows;
+    g->planes_tiles = (size_t)g->strip_rows * (size_t)g->columns;
+}
+
 int trip_gaussians_cpu_begin(trip_gaussians_cpu **out, const trip_gaussians_cpu_params *params)
 {
     *out = NULL;
@@ -145,9 +195,11 @@ int trip_gaussians_cpu_begin(trip_gaussians_cpu **out, const trip_gaussians_cpu_
     if (!kernels)
         return TRIP_USAGE;
     const trip_camera *c = params->camera;
+    int status = 1;
     trip_gaussians_cpu *g = trip_budget_take(params->budget, sizeof *g);
     if (g) {
         g->camera = *c;
+        g->device = params->device;
         g->settings = *params->settings;
         g->budget = params->budget;
         g->runner = params->runner ? *params->runner : (trip_task_runner){ 0 };
@@ -158,24 +210,29 @@ int trip_gaussians_cpu_begin(trip_gaussians_cpu **out, const trip_gaussians_cpu_
         g->tile_task = 4 + g->tiles / 65536;
         g->tile_floats =
             (size_t)(g->settings.depth ? TRIP_TILE_PLANES_MAX : TRIP_TILE_DEPTH) * TRIP_TILE_PIXELS;
-        if (take_what_fits(g)) {
-            for (size_t i = 0; i < g->tiles; i++)
-                clear_tile(g, i);
-            *out = g;
-            return 0;
-        }
+        size_planes(g);
+        status = take_what_fits(g);
+    }
+    if (!status) {
+        clear_tiles(g);
+        *out = g;
+        return 0;
     }
     trip_budget_release(params->budget, g, sizeof *g);
-    return trip_fail(TRIP_ERROR, "render", "memory",
-                     "a picture of %d x %d px does not fit; raise --memory or draw a smaller "
-                     "picture",
-                     c->width, c->height);
+    return status < 0
+               ? status
+               : trip_fail(TRIP_ERROR, "render", "memory",
+                           "a picture of %d x %d px does not fit; raise --memory or draw a smaller "
+                           "picture",
+                           c->width, c->height);
 }
 
 void trip_gaussians_cpu_end(trip_gaussians_cpu *g)
 {
     if (!g)
         return;
+    if (g->device)
+        g->device->end(g->on_device);
     release_buffers(g);
     trip_budget_release(g->budget, g, sizeof *g);
 }
@@ -204,10 +261,9 @@ static bool find_span(const trip_gaussians_cpu *g, const trip_gaussian_footprint
     return span_is_open(g, span);
 }
 
-/* Sets a Gaussian's span, and its projection unless the span is empty. */
-static void project(trip_gaussians_cpu *g, size_t i)
+/* Sets the span of place `i` of the batch, and its projection unless the span is empty. */
+static void project(trip_gaussians_cpu *g, const trip_gaussian *from, size_t i)
 {
-    const trip_gaussian *from = &g->gaussians[i];
     trip_gaussian_footprint f;
     tile_span span;
     g->spans[i] = (tile_span){ 1, 0, 1, 0 };
@@ -241,8 +297,8 @@ static void project_some(void *context, unsigned task)
 {
     trip_gaussians_cpu *g = context;
     const size_t from = (size_t)task * PROJECT_TASK;
-    for (size_t i = from; i < from + PROJECT_TASK && i < g->batch; i++)
-        project(g, i);
+    for (size_t i = from; i < from + PROJECT_TASK && i < g->next; i++)
+        project(g, &g->gaussians[i], g->batch + i);
 }
 
 /* ---- lists of tiles ---- */
@@ -355,8 +411,7 @@ static void list_tiles(void *context, unsigned row)
 static void composite_some(void *context, unsigned task)
 {
     trip_gaussians_cpu *g = context;
-    const float termination =
-        (float)(trip_gaussian_termination(&g->settings) * (1 - TERMINATION_SLACK));
+    const float termination = termination_of(g);
     const size_t from = (size_t)task * g->tile_task;
     for (size_t tile = from; tile < from + g->tile_task && tile < g->tiles; tile++)
         if (g->tile_count[tile] && g->open[tile])
@@ -372,36 +427,69 @@ static unsigned tasks_for(size_t count, size_t per_task)
     return (unsigned)((count + per_task - 1) / per_task);
 }
 
-static void add_batch(trip_gaussians_cpu *g)
+static int composite(trip_gaussians_cpu *g)
+{
+    if (!g->device) {
+        trip_run_tasks(&g->runner, composite_some, g, tasks_for(g->tiles, g->tile_task));
+        return 0;
+    }
+    return g->device->draw(g->on_device,
+                           &(trip_tile_piece){ .splats = g->splats,
+                                               .curves = g->curves,
+                                               .splat_from = g->piece_from,
+                                               .splat_to = g->piece_to,
+                                               .first = g->tile_first,
+                                               .count = g->tile_count,
+                                               .pairs = g->pairs,
+                                               .pair_count = g->row_pairs[g->rows] },
+                           g->open);
+}
+
+static void project_next(trip_gaussians_cpu *g)
 {
     const uint64_t began = trip_now_ns();
-    trip_run_tasks(&g->runner, project_some, g, tasks_for(g->batch, PROJECT_TASK));
+    trip_run_tasks(&g->runner, project_some, g, tasks_for(g->next, PROJECT_TASK));
+    g->batch += g->next;
     g->stats.project_ns += trip_now_ns() - began;
-    for (g->piece_to = 0; g->piece_to < g->batch;) {
+}
+
+/* Lists and composites the batch, and empties it. */
+int trip_gaussians_cpu_flush(trip_gaussians_cpu *g)
+{
+    int status = 0;
+    for (g->piece_to = 0; g->piece_to < g->batch && !status;) {
         const uint64_t bins = trip_now_ns();
         cut_piece(g);
         list_rows(g);
         trip_run_tasks(&g->runner, list_tiles, g, (unsigned)g->rows);
         const uint64_t composites = trip_now_ns();
-        trip_run_tasks(&g->runner, composite_some, g, tasks_for(g->tiles, g->tile_task));
+        status = composite(g);
         g->stats.bin_ns += composites - bins;
         g->stats.composite_ns += trip_now_ns() - composites;
         for (size_t i = 0; i < g->tiles; i++)
             g->stats.pairs += g->tile_count[i];
     }
+    g->batch = 0;
+    return status;
 }
 
 int trip_gaussians_cpu_add(trip_gaussians_cpu *g, const trip_gaussian *gaussians, size_t count)
 {
-    for (size_t i = 0; i < count; i += g->batch) {
-        const int status = trip_frame_poll();
+    for (size_t i = 0; i < count; i += g->next) {
+        int status = trip_frame_poll();
         if (status)
             return status;
+        const size_t room = g->batch_max - g->batch;
         g->gaussians = gaussians + i;
-        g->batch = count - i < g->batch_max ? count - i : g->batch_max;
-        g->stats.added += g->batch;
+        g->next = count - i < room ? count - i : room;
+        g->stats.added += g->next;
         if (trip_gaussians_cpu_open_tiles(g))
-            add_batch(g);
+            project_next(g);
+        /* A device takes large batches only: each loads and stores planes. */
+        if (!g->device || g->batch == g->batch_max)
+            status = trip_gaussians_cpu_flush(g);
+        if (status)
+            return status;
     }
     return 0;
 }
@@ -442,16 +530,17 @@ size_t trip_gaussians_cpu_open_tiles(const trip_gaussians_cpu *g)
 typedef struct picture {
     const trip_gaussians_cpu *g;
     float *rgba, *depth;
+    int first_row; /* of tiles, in the planes */
 } picture;
 
 static void write_pixel(const picture *p, int x, int y)
 {
     const trip_gaussians_cpu *g = p->g;
-    const float *from =
-        g->planes +
-        ((size_t)(y / TRIP_TILE_PX) * (size_t)g->columns + (size_t)(x / TRIP_TILE_PX)) *
-            g->tile_floats +
-        trip_tile_place(x % TRIP_TILE_PX, y % TRIP_TILE_PX);
+    const float *from = g->planes +
+                        ((size_t)(y / TRIP_TILE_PX - p->first_row) * (size_t)g->columns +
+                         (size_t)(x / TRIP_TILE_PX)) *
+                            g->tile_floats +
+                        trip_tile_place(x % TRIP_TILE_PX, y % TRIP_TILE_PX);
     const size_t at = (size_t)y * (size_t)g->camera.width + (size_t)x;
     const double *behind = g->settings.background;
     const float transmittance = fabsf(from[TRIP_TILE_T]);
@@ -471,16 +560,26 @@ static void write_pixel(const picture *p, int x, int y)
 static void write_rows(void *context, unsigned row)
 {
     const picture *p = context;
-    const int end = clamped(((int)row + 1) * TRIP_TILE_PX, p->g->camera.height);
-    for (int y = (int)row * TRIP_TILE_PX; y < end; y++)
+    const int first = (p->first_row + (int)row) * TRIP_TILE_PX;
+    const int end = clamped(first + TRIP_TILE_PX, p->g->camera.height);
+    for (int y = first; y < end; y++)
         for (int x = 0; x < p->g->camera.width; x++)
             write_pixel(p, x, y);
 }
 
-void trip_gaussians_cpu_picture(const trip_gaussians_cpu *g, float *rgba, float *depth)
+int trip_gaussians_cpu_picture(trip_gaussians_cpu *g, float *rgba, float *depth)
 {
-    picture p = { g, rgba, g->settings.depth ? depth : NULL };
-    trip_run_tasks(&g->runner, write_rows, &p, (unsigned)g->rows);
+    picture p = { g, rgba, g->settings.depth ? depth : NULL, 0 };
+    int status = trip_gaussians_cpu_flush(g);
+    for (; p.first_row < g->rows && !status; p.first_row += g->strip_rows) {
+        const int rows = clamped(g->rows - p.first_row, g->strip_rows);
+        if (g->device)
+            status = g->device->read(g->on_device, (size_t)p.first_row * (size_t)g->columns,
+                                     (size_t)rows * (size_t)g->columns, g->planes);
+        if (!status)
+            trip_run_tasks(&g->runner, write_rows, &p, (unsigned)rows);
+    }
+    return status;
 }
 
 trip_gaussians_cpu_stats trip_gaussians_cpu_get_stats(const trip_gaussians_cpu *g)

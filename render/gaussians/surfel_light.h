@@ -9,7 +9,8 @@
 #include "gaussian.h"
 #include "settings.h"
 
-/* Lights surfels with harmonics of degree 0. The third principal axis is the normal. */
+/* Lights surfels with harmonics of degree 0, unless `s` is NULL. The principal axis with the least
+ * deviation is the normal: the third axis of a flat surfel. */
 void trip_surfel_light(const trip_settings *s, const trip_camera *c, trip_gaussian *surfels,
                        size_t count);
 

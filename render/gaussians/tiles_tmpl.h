@@ -184,6 +184,8 @@ INLINE void draw_splats(float *planes, uint16_t *open, const trip_projected *spl
     }
 }
 
+#include "sheets_tmpl.h"
+
 #define TRIP_TILE_TABLE(name, isa_name)                                                            \
     static void draw(float *planes, uint16_t *open, const trip_projected *splats,                  \
                      const trip_curve *curves, const uint32_t *list, size_t count, int x, int y,   \
@@ -197,6 +199,6 @@ INLINE void draw_splats(float *planes, uint16_t *open, const trip_projected *spl
             draw_splats(planes, open, splats, NULL, list, count, x, y, termination, false);        \
     }                                                                                              \
     extern const trip_tile_kernels name;                                                           \
-    const trip_tile_kernels name = { isa_name, draw }
+    const trip_tile_kernels name = { isa_name, draw, draw_sheets }
 
 #endif

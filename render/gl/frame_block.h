@@ -39,7 +39,8 @@ enum trip_gl_effect {
     TRIP_GL_RESIDENT = 8388608, /* with INDEXED: an array of vertices for each list, no indices */
     TRIP_GL_TWO_POINTS = 16777216, /* culls by trip_weight_of_two_points() */
     TRIP_GL_BLURRED = 33554432,    /* deviations blur the function (blurred_function.h) */
-    TRIP_GL_EFFECT_SETS = 67108864,
+    TRIP_GL_CURVED = 67108864,     /* footprints of Gaussians may be curved (gaussian_tiles.h) */
+    TRIP_GL_EFFECT_SETS = 134217728,
 };
 
 /* Returns x minus x rounded to float. The variable is volatile because GCC 12 replaces

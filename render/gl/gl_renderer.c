@@ -23,6 +23,7 @@
 #include "gl/resident.h"
 #include "gl/ring.h"
 #include "gl/gl_sheets.h"
+#include "gl/gl_tiles.h"
 #include "gl/slots.h"
 #include "gl/sums.h"
 #include "gl/target.h"
@@ -60,6 +61,7 @@ typedef struct gl_renderer {
     trip_gl_lattices lattices; /* only for frames with effects */
     trip_gl_sheets sheets;     /* only for `post` */
     trip_gl_sums sums;         /* only for frames that composite sheet by sheet */
+    trip_gl_tiles tiles;       /* only for Gaussian scenes */
     const trip_frame *frame;
     bool in_layer;          /* some sheets of the current layer may not be drawn yet */
     int axis;               /* of the current layer */
@@ -685,6 +687,11 @@ static void end_frame(trip_renderer *base)
     trip_gl_ring_leave(&r->ring);
 }
 
+static const trip_tile_device *tile_device(trip_renderer *base)
+{
+    return &((gl_renderer *)base)->tiles.device;
+}
+
 static trip_list_stats stats(const trip_renderer *base, unsigned list)
 {
     return ((const gl_renderer *)base)->stats[list];
@@ -711,6 +718,7 @@ static const trip_renderer_ops gl_ops = {
     .is_done = is_done,
     .picture = picture,
     .end_frame = end_frame,
+    .tile_device = tile_device,
     .stats = stats,
 };
 
@@ -789,6 +797,8 @@ int trip_gl_create(trip_renderer **out, trip_budget *budget)
         destroy(&r->base);
         return status;
     }
+    r->tiles = (trip_gl_tiles){ r->context, &r->queue, &r->variants, { 0 } };
+    trip_gl_tiles_set_up(&r->tiles);
     r->base.software = r->target.software = trip_gl_context_limits(r->context)->software;
     describe(r);
     *out = &r->base;

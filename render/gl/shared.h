@@ -31,6 +31,13 @@
 /* Reused for splats of grids with uneven spacing; indexed lists use the second number. */
 #define TRIP_GL_VOXEL_POSITIONS 7
 #define TRIP_GL_VOXEL_POSITIONS_INDEXED 0
+/* Reused for Gaussian scenes. */
+#define TRIP_GL_TILE_PLANES 0
+#define TRIP_GL_TILE_CLOSED 1
+#define TRIP_GL_TILE_SPLATS 2
+#define TRIP_GL_TILE_CURVES 3
+#define TRIP_GL_TILE_PAIRS 4
+#define TRIP_GL_TILE_JOBS 5
 /* Texture units. The layer of axis a uses unit a, its depths unit 3 + a. */
 #define TRIP_GL_LAYER 0
 #define TRIP_GL_LAYER_DEPTH 3
@@ -56,12 +63,19 @@
 #define TRIP_GL_SHEET_SIZE 1
 #define TRIP_GL_SHEET_APART 2
 #define TRIP_GL_SHEET_SCALE 3
+#define TRIP_GL_TILE_GRID 0
+#define TRIP_GL_TILE_PICTURE 1
+#define TRIP_GL_TILE_TERMINATION 2
+#define TRIP_GL_TILE_FIRST_JOB 3
 /* Codes of missing voxels in a sheet, for whole codes and for exact draw codes. */
 #define TRIP_GL_MISSING_WHOLE -1.0
 #define TRIP_GL_MISSING_EXACT -3e38
 /* Directions of rays, as in trip_way. */
 #define TRIP_GL_WAY_ANY 0
 #define TRIP_GL_WAY_UP 1
+/* Side of a tile of a Gaussian scene in pixels, TRIP_TILE_PX, and its pixels. */
+#define TRIP_GL_TILE_PX 16
+#define TRIP_GL_TILE_PIXELS 256
 /* Invocations of a work group in the counting pass. */
 #define TRIP_GL_COUNT_GROUP 64
 /* Invocations along each side of a work group over a sheet or a picture. */
@@ -201,10 +215,12 @@
 
 #ifdef TRIP_GLSL
 #define TRIP_GL_VEC3 vec3
+#define TRIP_GL_VEC4 vec4
 #define TRIP_GL_INT int
 #else
 #include <stdint.h>
 #define TRIP_GL_VEC3 trip_gl_vec3
+#define TRIP_GL_VEC4 trip_gl_float4
 #define TRIP_GL_INT int32_t
 typedef struct trip_gl_vec3 {
     float x, y, z;
@@ -292,6 +308,27 @@ struct trip_gl_blurred_entry {
 struct trip_gl_closed {
     TRIP_GL_FLOAT scale, offset, ramp, unused;
     TRIP_GL_FLOAT k[4], q0[4], q1[4];
+};
+
+/* A projected Gaussian: trip_projected with u and v at the first pixel of a tile. `tile` holds the
+ * tile's column and row, 16 bits each. */
+struct trip_gl_projected {
+    TRIP_GL_VEC4 uv;   /* u, v, across, across_shear */
+    TRIP_GL_VEC4 rest; /* down, limit, opacity, z */
+    TRIP_GL_VEC3 rgb;
+    TRIP_GL_UINT tile;
+};
+
+/* The rest of a curved footprint: trip_curve with w, a and b at the same pixel. If a footprint is
+ * not curved, its w is 1 and all other numbers are 0. */
+struct trip_gl_curve {
+    TRIP_GL_VEC4 w_a_b; /* w, a, b, turn */
+    TRIP_GL_VEC4 steps; /* bend_x, bend_y, tilt, skew */
+};
+
+/* A tile to draw: its number in the band, its first pair, and their number. */
+struct trip_gl_tile {
+    TRIP_GL_UINT tile, first, count;
 };
 
 /* A run of a list to draw. In indexed lists draw position i is record first + step * i.

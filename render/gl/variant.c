@@ -5,6 +5,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
+#include "gaussian_picture.h"
 #include "gl/frame_block.h"
 #include "gl/program.h"
 #include "report.h"
@@ -38,6 +39,8 @@ static const struct {
                                       TRIP_GL_EMISSION | TRIP_GL_CLOSED | TRIP_GL_NEAREST |
                                       TRIP_GL_BLURRED,
                                   false },
+    [TRIP_GL_PASS_TILES] = { NULL, NULL, "tiles.comp", TRIP_GL_DEPTH | TRIP_GL_CURVED, false },
+    [TRIP_GL_PASS_TILE_CLEAR] = { NULL, NULL, "tile_clear.comp", TRIP_GL_DEPTH, false },
 };
 
 static void write_effects(FILE *out, unsigned effects)
@@ -59,6 +62,7 @@ static void write_effects(FILE *out, unsigned effects)
         { TRIP_GL_CLOSED, "CLOSED" },         { TRIP_GL_EXACT, "EXACT" },
         { TRIP_GL_NEAREST, "NEAREST" },       { TRIP_GL_RESIDENT, "RESIDENT" },
         { TRIP_GL_TWO_POINTS, "TWO_POINTS" }, { TRIP_GL_BLURRED, "BLURRED" },
+        { TRIP_GL_CURVED, "CURVED" },
     };
     for (size_t i = 0; i < sizeof names / sizeof *names; i++)
         if (effects & names[i].effect)
@@ -74,6 +78,9 @@ static void write_defines(FILE *out, const trip_gl_variant *variant)
     fprintf(out, "#define AFFINE_MAX %f\n#define AFFINE_REACH %f\n", TRIP_SPLAT_AFFINE,
             TRIP_SPLAT_AFFINE_REACH);
     write_effects(out, variant->effects);
+    if (variant->pass == TRIP_GL_PASS_TILES)
+        fprintf(out, "#define ALPHA_MIN %.9f\n#define ALPHA_MAX %.9f\n", TRIP_GAUSSIAN_ALPHA_MIN,
+                TRIP_GAUSSIAN_ALPHA_MAX);
     if (variant->effects & TRIP_GL_WIDE)
         fprintf(out, "#define CUBIC %d\n#define CUTOFF %.9f\n", (int)TRIP_KERNEL_CUBIC,
                 TRIP_CUTOFF);

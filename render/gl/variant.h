@@ -18,6 +18,8 @@ typedef enum trip_gl_pass {
     TRIP_GL_PASS_SHEET_DECODE,
     TRIP_GL_PASS_SHEET_GRADIENT,
     TRIP_GL_PASS_SHEET_DRAW,
+    TRIP_GL_PASS_TILES,
+    TRIP_GL_PASS_TILE_CLEAR,
 } trip_gl_pass;
 
 typedef struct trip_gl_variant {

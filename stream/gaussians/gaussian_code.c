@@ -73,6 +73,55 @@ static void include(double lo[3], double hi[3], const double at[3], const double
     }
 }
 
+static unsigned char *pack_harmonics(float largest, const float sh[TRIP_SH_MAX][3], int n,
+                                     unsigned char *to)
+{
+    const double scale = (double)largest;
+    for (int k = n * n; k < trip_sh_count(n); k++)
+        for (int c = 0; c < 3; c++) {
+            const double part = scale > 0 ? (double)sh[k][c] / scale : 0;
+            *to++ = (unsigned char)(int8_t)lrint(lowest(part, -1, 1) * HARMONIC_MAX);
+        }
+    return to;
+}
+
+static const unsigned char *unpack_harmonics(float largest, const unsigned char *from, int n,
+                                             float sh[TRIP_SH_MAX][3])
+{
+    const float step = largest / HARMONIC_MAX;
+    for (int k = n * n; k < trip_sh_count(n); k++)
+        for (int c = 0; c < 3; c++)
+            sh[k][c] = (float)(int8_t)*from++ * step;
+    return from;
+}
+
+static float largest_of(const float sh[TRIP_SH_MAX][3], int n)
+{
+    float largest = 0;
+    for (int k = n * n; k < trip_sh_count(n); k++)
+        for (int c = 0; c < 3; c++)
+            largest = fmaxf(largest, fabsf(sh[k][c]));
+    return largest;
+}
+
+void trip_gaussian_encode_entry(const float sh[TRIP_SH_MAX][3], int degree, unsigned char *entry)
+{
+    for (int n = 1; n <= degree; n++) {
+        const float largest = largest_of(sh, n);
+        memcpy(entry, &largest, sizeof largest);
+        entry = pack_harmonics(largest, sh, n, entry + sizeof largest);
+    }
+}
+
+void trip_gaussian_decode_entry(const unsigned char *entry, int degree, float sh[TRIP_SH_MAX][3])
+{
+    for (int n = 1; n <= degree; n++) {
+        float largest;
+        memcpy(&largest, entry, sizeof largest);
+        entry = unpack_harmonics(largest, entry + sizeof largest, n, sh);
+    }
+}
+
 static void find_ranges(trip_file_gaussian_brick *b, const unsigned char *const *splats,
                         unsigned count, int degree)
 {
@@ -95,9 +144,7 @@ static void find_ranges(trip_file_gaussian_brick *b, const unsigned char *const 
             }
         }
         for (int n = 1; n <= degree; n++)
-            for (int k = n * n; k < trip_sh_count(n); k++)
-                for (int c = 0; c < 3; c++)
-                    b->scale[n - 1] = fmaxf(b->scale[n - 1], fabsf(g.sh[k][c]));
+            b->scale[n - 1] = fmaxf(b->scale[n - 1], largest_of(g.sh, n));
     }
     b->log_hi = log_hi >= log_lo ? (float)log_hi : 0;
     b->log_lo = log_hi >= log_lo ? (float)fmax(log_lo, log_hi - LOG_RANGE) : 0;
@@ -151,18 +198,6 @@ static words pack(const trip_file_gaussian_brick *b, const trip_gaussian *g)
     return r;
 }
 
-static unsigned char *pack_harmonics(const trip_file_gaussian_brick *b, const trip_gaussian *g,
-                                     int n, unsigned char *to)
-{
-    const double scale = (double)b->scale[n - 1];
-    for (int k = n * n; k < trip_sh_count(n); k++)
-        for (int c = 0; c < 3; c++) {
-            const double part = scale > 0 ? (double)g->sh[k][c] / scale : 0;
-            *to++ = (unsigned char)(int8_t)lrint(lowest(part, -1, 1) * HARMONIC_MAX);
-        }
-    return to;
-}
-
 void trip_gaussian_half_extents(const trip_gaussian *g, double half[3])
 {
     const double w = (double)g->rotation[0], x = (double)g->rotation[1], y = (double)g->rotation[2],
@@ -198,22 +233,26 @@ static void find_reach(trip_file_gaussian_brick *b, const unsigned char *records
     }
 }
 
-void trip_gaussian_encode(trip_file_gaussian_brick *b, const unsigned char *const *splats,
-                          unsigned count, int degree, unsigned char *const planes[])
+void trip_gaussian_encode(trip_file_gaussian_brick *b, const trip_file_gaussian_header *h,
+                          const unsigned char *const *splats, unsigned count,
+                          unsigned char *const planes[])
 {
-    find_ranges(b, splats, count, degree);
+    const int degree = (int)h->degree, own = h->flags & TRIP_GAUSSIAN_PALETTE ? 0 : degree;
+    const unsigned plane_count = trip_gaussian_plane_count(h, degree);
+    find_ranges(b, splats, count, own);
     b->records = count;
     for (unsigned i = 0; i < count; i++) {
-        const trip_gaussian g = fetch(splats[i], degree);
+        const trip_gaussian g = fetch(splats[i], own);
         const words r = pack(b, &g);
         memcpy(planes[0] + i * sizeof r, &r, sizeof r);
-        for (int n = 1; n <= degree; n++)
-            pack_harmonics(b, &g, n, planes[n] + i * trip_gaussian_plane_bytes((unsigned)n));
+        for (int n = 1; n <= own; n++)
+            pack_harmonics(b->scale[n - 1], g.sh, n,
+                           planes[n] + i * trip_gaussian_plane_bytes(h, (unsigned)n));
     }
     find_reach(b, planes[0], count);
     for (unsigned n = 0; n < TRIP_GAUSSIAN_PLANES; n++)
-        b->checksums[n] = (int)n <= degree
-                              ? XXH64(planes[n], count * (size_t)trip_gaussian_plane_bytes(n), 0)
+        b->checksums[n] = n < plane_count
+                              ? XXH64(planes[n], count * (size_t)trip_gaussian_plane_bytes(h, n), 0)
                               : 0;
 }
 
@@ -268,6 +307,7 @@ void trip_gaussian_decode(const trip_file_gaussian_brick *b, const unsigned char
 {
     const words r = load(record);
     memset(out->sh, 0, sizeof out->sh);
+    out->merged = 0;
     trip_gaussian_decode_centre(b, record, out->centre);
     for (int a = 0; a < 3; a++)
         out->deviations[a] = decode_deviation(b, bits(r.w[2], (unsigned)(12 * a), 12));
@@ -276,12 +316,8 @@ void trip_gaussian_decode(const trip_file_gaussian_brick *b, const unsigned char
     out->sh[0][0] = decode_colour(b, bits(r.w[1], 50, 14), 0);
     out->sh[0][1] = decode_colour(b, bits(r.w[2], 36, 14), 1);
     out->sh[0][2] = decode_colour(b, bits(r.w[2], 50, 14), 2);
-    for (int n = 1; n <= degree; n++) {
-        const float step = b->scale[n - 1] / HARMONIC_MAX;
-        for (int k = n * n; k < trip_sh_count(n); k++)
-            for (int c = 0; c < 3; c++)
-                out->sh[k][c] = (float)(int8_t)*harmonics++ * step;
-    }
+    for (int n = 1; n <= degree; n++)
+        harmonics = unpack_harmonics(b->scale[n - 1], harmonics, n, out->sh);
 }
 
 const char *trip_gaussian_record_fault(const unsigned char *record)

@@ -7,15 +7,20 @@
 #include "gaussian.h"
 #include "gaussian_format.h"
 
-/* Returns floor(log4(largest deviation)). Records of one brick have the same class. A size of 0 has
- * the least class. */
+/* Returns floor(log4(largest deviation)). A size of 0 has the least class. */
 int trip_gaussian_size_class(const float deviations[3]);
 
 /* Encodes records, in the given order, into planes[0 .. degree]. Sets the bounds and ranges
  * of *b, except first_record and size_class, and the checksums. Each pointer is the address of a
- * trip_gaussian that has only the coefficients up to `degree`. */
-void trip_gaussian_encode(trip_file_gaussian_brick *b, const unsigned char *const *splats,
-                          unsigned count, int degree, unsigned char *const planes[]);
+ * trip_gaussian that has only the coefficients up to `degree`. With a palette, the caller has
+ * written planes[1]. */
+void trip_gaussian_encode(trip_file_gaussian_brick *b, const trip_file_gaussian_header *h,
+                          const unsigned char *const *splats, unsigned count,
+                          unsigned char *const planes[]);
+/* Encodes an entry of a palette. `sh` are the coefficients of a trip_gaussian. */
+void trip_gaussian_encode_entry(const float sh[TRIP_SH_MAX][3], int degree, unsigned char *entry);
+/* Sets the coefficients of degree 1 to `degree` from an entry. */
+void trip_gaussian_decode_entry(const unsigned char *entry, int degree, float sh[TRIP_SH_MAX][3]);
 
 /* Decodes the centre of a record. It lies within the brick's bounds. */
 void trip_gaussian_decode_centre(const trip_file_gaussian_brick *b, const unsigned char *record,

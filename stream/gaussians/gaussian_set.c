@@ -17,9 +17,12 @@
 
 enum { WHERE_BYTES = 4096 };
 
-const char *trip_gaussian_plane_name(int axis, unsigned plane, char *name)
+const char *trip_gaussian_plane_name(const trip_file_gaussian_header *h, int axis, unsigned plane,
+                                     char *name)
 {
-    if (plane)
+    if (plane && h->flags & TRIP_GAUSSIAN_PALETTE)
+        snprintf(name, 32, "%c.palette", "xyz"[axis]);
+    else if (plane)
         snprintf(name, 32, "%c.harmonics%u", "xyz"[axis], plane);
     else
         snprintf(name, 32, "%c.gaussians", "xyz"[axis]);
@@ -101,8 +104,8 @@ static int open_plane(trip_gaussian_set *s, int folder, int axis, unsigned plane
 {
     char name[32], where[WHERE_BYTES];
     uint64_t bytes = 0;
-    const uint64_t wanted = s->header.records * trip_gaussian_plane_bytes(plane);
-    trip_gaussian_plane_name(axis, plane, name);
+    const uint64_t wanted = s->header.list_records * trip_gaussian_plane_bytes(&s->header, plane);
+    trip_gaussian_plane_name(&s->header, axis, plane, name);
     const int status = open_file(s, folder, name, &s->lists[axis].fd[plane], &bytes);
     if (status < 0)
         return status;
@@ -125,10 +128,14 @@ static int open_files(trip_gaussian_set *s, int folder)
         return status;
     unsigned char *index = s->memory;
     s->text = (char *)index + s->header.text_offset;
+    s->nodes = (const void *)(index + s->header.nodes_offset);
+    if (s->header.palette_count)
+        s->palette = index + s->header.palette_offset;
+    const unsigned planes = trip_gaussian_plane_count(&s->header, (int)s->header.degree);
     for (int a = 0; a < 3; a++) {
         s->lists[a].bricks = (const void *)(index + s->header.bricks_offset[a]);
         s->lists[a].brick_count = s->header.brick_count[a];
-        for (unsigned plane = 0; plane <= s->header.degree && status == TRIP_OK; plane++)
+        for (unsigned plane = 0; plane < planes && status == TRIP_OK; plane++)
             status = open_plane(s, folder, a, plane);
     }
     return status;
@@ -177,12 +184,12 @@ int trip_gaussian_set_read(const trip_gaussian_set *s, int axis, uint64_t brick,
 {
     char name[32], where[WHERE_BYTES];
     const trip_file_gaussian_brick *b = &s->lists[axis].bricks[brick];
-    const size_t record = trip_gaussian_plane_bytes(plane), bytes = b->records * record;
+    const size_t record = trip_gaussian_plane_bytes(&s->header, plane), bytes = b->records * record;
     const uint64_t offset = b->first_record * record;
     const ssize_t n = trip_read_at(s->lists[axis].fd[plane], to, bytes, bytes, offset);
     if (n == (ssize_t)bytes && XXH64(to, bytes, 0) == b->checksums[plane])
         return TRIP_OK;
-    set_where(s, trip_gaussian_plane_name(axis, plane, name), where);
+    set_where(s, trip_gaussian_plane_name(&s->header, axis, plane, name), where);
     if (n < 0)
         return trip_fail_errno("read", where, "cannot read");
     if (n < (ssize_t)bytes)
@@ -209,22 +216,40 @@ static const char *fault_of_records(const unsigned char *records, uint32_t count
     return NULL;
 }
 
+/* Returns whether the palette has all entries that the records name. */
+static bool are_entries(const trip_gaussian_set *s, const unsigned char *records, uint32_t count)
+{
+    bool all = true;
+    for (uint32_t i = 0; i < count; i++)
+        all &= trip_gaussian_entry_number(records + 2 * i) < s->header.palette_count;
+    return all;
+}
+
 static int verify_brick(const trip_gaussian_set *s, int axis, uint64_t brick, unsigned char *room)
 {
     char name[32], where[WHERE_BYTES];
     const trip_file_gaussian_brick *b = &s->lists[axis].bricks[brick];
     int status = TRIP_OK;
-    for (unsigned plane = s->header.degree; plane > 0 && status == TRIP_OK; plane--)
+    unsigned plane = trip_gaussian_plane_count(&s->header, (int)s->header.degree) - 1;
+    for (; plane > 0 && status == TRIP_OK; plane--) {
         status = trip_gaussian_set_read(s, axis, brick, plane, room);
+        if (status == TRIP_OK && s->palette && !are_entries(s, room, b->records))
+            return trip_fail(
+                TRIP_ERROR, "read",
+                set_where(s, trip_gaussian_plane_name(&s->header, axis, 1, name), where),
+                "byte %llu: a record has a number above those of the palette",
+                (unsigned long long)(2 * b->first_record));
+    }
     if (status == TRIP_OK)
         status = trip_gaussian_set_read(s, axis, brick, 0, room);
     const char *fault = status == TRIP_OK ? fault_of_records(room, b->records, axis) : NULL;
-    return fault ? trip_fail(TRIP_ERROR, "read",
-                             set_where(s, trip_gaussian_plane_name(axis, 0, name), where),
-                             "byte %llu: %s",
-                             (unsigned long long)(b->first_record * TRIP_GAUSSIAN_RECORD_BYTES),
-                             fault)
-                 : status;
+    return fault
+               ? trip_fail(TRIP_ERROR, "read",
+                           set_where(s, trip_gaussian_plane_name(&s->header, axis, 0, name), where),
+                           "byte %llu: %s",
+                           (unsigned long long)(b->first_record * TRIP_GAUSSIAN_RECORD_BYTES),
+                           fault)
+               : status;
 }
 
 int trip_gaussian_set_verify(const trip_gaussian_set *s, trip_budget *budget)

@@ -9,8 +9,8 @@
 #include "budget.h"
 #include "gaussian_format.h"
 
-/* The records in the order of one axis. Bricks stand by ascending class of size. The bricks of a
- * class stand by slabs of ascending coordinate. */
+/* The records in the order of one axis. Bricks stand by node. The bricks of a node stand by
+ * ascending class of size, then by slabs of ascending coordinate. */
 typedef struct trip_gaussian_list {
     const trip_file_gaussian_brick *bricks;
     uint64_t brick_count;
@@ -20,10 +20,12 @@ typedef struct trip_gaussian_list {
 typedef struct trip_gaussian_set {
     char *path;
     trip_file_gaussian_header header;
-    trip_gaussian_list lists[3]; /* along X, Y, Z */
-    char *text;                  /* JSON, null-terminated */
-    uint64_t bytes;              /* of all files */
-    void *memory;                /* the index and a terminator of its text; from the budget */
+    const trip_file_gaussian_node *nodes;
+    const unsigned char *palette; /* entries; NULL without a palette */
+    trip_gaussian_list lists[3];  /* along X, Y, Z */
+    char *text;                   /* JSON, null-terminated */
+    uint64_t bytes;               /* of all files */
+    void *memory;                 /* the index and a terminator of its text; from the budget */
     size_t memory_bytes;
     trip_budget *budget;
 } trip_gaussian_set;
@@ -35,7 +37,7 @@ int trip_gaussian_set_open(trip_gaussian_set **out, const char *path, trip_budge
 void trip_gaussian_set_close(trip_gaussian_set *s);
 
 /* Reads a brick's bytes of a plane and checks their checksum. `to` has room for
- * records * trip_gaussian_plane_bytes(plane) bytes. Any thread. */
+ * records * trip_gaussian_plane_bytes() bytes. Any thread. */
 int trip_gaussian_set_read(const trip_gaussian_set *s, int axis, uint64_t brick, unsigned plane,
                            void *to);
 
@@ -43,6 +45,7 @@ int trip_gaussian_set_read(const trip_gaussian_set *s, int axis, uint64_t brick,
 int trip_gaussian_set_verify(const trip_gaussian_set *s, trip_budget *budget);
 
 /* Writes the name of a plane file, such as "x.gaussians", to `name` (at least 32 bytes). */
-const char *trip_gaussian_plane_name(int axis, unsigned plane, char *name);
+const char *trip_gaussian_plane_name(const trip_file_gaussian_header *h, int axis, unsigned plane,
+                                     char *name);
 
 #endif

@@ -24,6 +24,8 @@ enum {
 typedef struct step {
     double lo, hi; /* bounds of the keys */
     uint64_t brick;
+    float share; /* of the optical depth of its splats */
+    bool is_coarse;
 } step;
 
 /* A splat in the window. The bytes of the record and of its coefficients follow. */
@@ -56,6 +58,7 @@ struct trip_gaussian_stream {
     trip_gaussian_plan plan;
     steps steps;
     int degree;
+    unsigned plane_count;
     unsigned char *memory;
     size_t memory_bytes;
     unsigned char *slots;
@@ -124,6 +127,14 @@ static bool is_behind(const trip_gaussian_plane *p, const trip_file_gaussian_bri
     return corner_key(&key, b, true) + p->reach * radius < 0;
 }
 
+/* Returns the keys of a brick's centres minus the keys of its splats. */
+static double lead_of(const trip_gaussian_stream_params *p, const trip_file_gaussian_brick *b)
+{
+    return p->reach > 0
+               ? p->reach * exp((double)b->log_hi) + fmax(0, corner_key(&p->spread, b, true))
+               : 0;
+}
+
 static bool has_keys(const trip_gaussian_stream_params *p)
 {
     return p->key_min != 0 || p->key_max != 0;
@@ -138,6 +149,62 @@ static bool is_wanted(const trip_gaussian_stream_params *p, const trip_file_gaus
         if (is_behind(&p->planes[i], b))
             return false;
     return true;
+}
+
+/* Returns the share of a node with nodes inside it. It is 0 if the voxels are too wide, and 1 if
+ * they are narrower by a quarter of an octave. */
+static double share_of(const trip_gaussian_lod *lod, const trip_file_gaussian_node *n)
+{
+    const double octaves = 0.25;
+    double square = 0;
+    if (!(lod->voxel_px > 0))
+        return 0;
+    for (int a = 0; a < 3; a++) {
+        const double away = fmax(0, fmax(n->lo[a] - lod->eye[a], lod->eye[a] - n->hi[a]));
+        square += away * away;
+    }
+    const double width = n->width * lod->px / (lod->parallel ? 1 : sqrt(square));
+    return width < lod->voxel_px ? fmin(1, log2(lod->voxel_px / width) / octaves) : 0;
+}
+
+bool trip_gaussian_walk_next(const trip_gaussian_set *set, const trip_gaussian_lod *lod,
+                             trip_gaussian_walk *walk)
+{
+    while (walk->next < set->header.node_count) {
+        const trip_file_gaussian_node *n = &set->nodes[walk->next];
+        const double rest = walk->next < walk->end ? walk->rest : 1;
+        const double share = n->nodes > 1 ? share_of(lod, n) : 1;
+        walk->node = walk->next;
+        walk->next += share < 1 && rest == 1 ? 1 : share > 0 ? n->nodes : 1;
+        walk->share = rest < 1 ? rest : share;
+        if (!(share > 0))
+            continue;
+        if (share < 1 && rest == 1) {
+            walk->end = walk->node + n->nodes;
+            walk->rest = 1 - share;
+        }
+        return true;
+    }
+    return false;
+}
+
+/* Adds the bricks of a node that are wanted. */
+static void add_node(steps *s, step *found, trip_key *keys, const trip_gaussian_set *set,
+                     const trip_gaussian_stream_params *p, const trip_gaussian_walk *walk)
+{
+    const trip_file_gaussian_node *n = &set->nodes[walk->node];
+    const uint64_t first = n->first_brick[p->axis];
+    for (uint64_t i = first; i < first + n->brick_count[p->axis]; i++) {
+        const trip_file_gaussian_brick *b = &set->lists[p->axis].bricks[i];
+        const double lead = lead_of(p, b);
+        const step here = { corner_key(&p->key, b, false) - lead,
+                            corner_key(&p->key, b, true) - lead, i, (float)walk->share,
+                            n->nodes > 1 };
+        if (!is_wanted(p, b, &here))
+            continue;
+        keys[s->count] = (trip_key){ trip_key_of(here.lo), s->count };
+        found[s->count++] = here;
+    }
 }
 
 /* Finds the bricks to read and sorts them by their least keys. */
@@ -156,14 +223,9 @@ static int make_steps(steps *s, const trip_gaussian_set *set, const trip_gaussia
     s->sorted = (void *)s->memory;
     step *found = s->sorted + room;
     trip_key *keys = (void *)(found + room), *scratch = keys + room;
-    for (uint64_t i = 0; i < room; i++) {
-        const trip_file_gaussian_brick *b = &list->bricks[i];
-        const step here = { corner_key(&p->key, b, false), corner_key(&p->key, b, true), i };
-        if (!is_wanted(p, b, &here))
-            continue;
-        keys[s->count] = (trip_key){ trip_key_of(here.lo), s->count };
-        found[s->count++] = here;
-    }
+    trip_gaussian_walk walk = { 0 };
+    while (trip_gaussian_walk_next(set, &p->lod, &walk))
+        add_node(s, found, keys, set, p, &walk);
     trip_key_sort(keys, scratch, s->count);
     for (uint64_t i = 0; i < s->count; i++)
         s->sorted[i] = found[keys[i].number];
@@ -175,11 +237,11 @@ static void free_steps(steps *s, trip_budget *budget)
     trip_budget_release(budget, s->memory, s->bytes);
 }
 
-static size_t slot_size(int degree)
+static size_t slot_size(const trip_file_gaussian_header *h, int degree)
 {
     size_t bytes = sizeof(slot);
-    for (int n = 0; n <= degree; n++)
-        bytes += trip_gaussian_plane_bytes((unsigned)n);
+    for (unsigned n = 0; n < trip_gaussian_plane_count(h, degree); n++)
+        bytes += trip_gaussian_plane_bytes(h, n);
     return (bytes + 7) & ~(size_t)7;
 }
 
@@ -189,11 +251,11 @@ static int degree_of(const trip_gaussian_set *set, const trip_gaussian_stream_pa
     return p->degree < 0 ? 0 : p->degree < most ? p->degree : most;
 }
 
-static size_t planes_size(int degree)
+static size_t planes_size(const trip_file_gaussian_header *h, int degree)
 {
     size_t bytes = 0;
-    for (int n = 0; n <= degree; n++)
-        bytes += (size_t)TRIP_GAUSSIAN_BRICK_RECORDS_MAX * trip_gaussian_plane_bytes((unsigned)n);
+    for (unsigned n = 0; n < trip_gaussian_plane_count(h, degree); n++)
+        bytes += (size_t)TRIP_GAUSSIAN_BRICK_RECORDS_MAX * trip_gaussian_plane_bytes(h, n);
     return bytes;
 }
 
@@ -218,6 +280,28 @@ static uint64_t window_of(const steps *s, const trip_gaussian_list *list)
     return most;
 }
 
+/* Returns the greatest number of splats that meet a plane while it makes a step. */
+static uint64_t held_of(const steps *s, const trip_gaussian_list *list,
+                        const trip_gaussian_stream_params *p)
+{
+    uint64_t held = 0, most = 0, gone = 0;
+    trip_key *leaving = (void *)(s->sorted + 2 * list->brick_count);
+    trip_key *scratch = leaving + list->brick_count;
+    for (uint64_t i = 0; i < s->count; i++) {
+        const double lead = lead_of(p, &list->bricks[s->sorted[i].brick]);
+        leaving[i] = (trip_key){ trip_key_of(s->sorted[i].hi + 2 * lead + p->hold), i };
+    }
+    trip_key_sort(leaving, scratch, s->count);
+    for (uint64_t i = 0; i < s->count; i++) {
+        const uint64_t lo = trip_key_of(s->sorted[i].lo);
+        for (; leaving[gone].key < lo; gone++)
+            held -= list->bricks[s->sorted[leaving[gone].number].brick].records;
+        held += list->bricks[s->sorted[i].brick].records;
+        most = held > most ? held : most;
+    }
+    return most;
+}
+
 /* Each step may have a chunk that is not full. */
 static uint64_t chunk_count(uint64_t bricks, uint64_t window)
 {
@@ -225,11 +309,12 @@ static uint64_t chunk_count(uint64_t bricks, uint64_t window)
 }
 
 /* Returns the memory beside the steps. */
-static size_t memory_of(const steps *s, uint64_t window, int degree)
+static size_t memory_of(const trip_file_gaussian_header *h, const steps *s, uint64_t window,
+                        int degree)
 {
-    return window * (slot_size(degree) + 2 * sizeof(trip_key) + sizeof(int64_t)) +
+    return window * (slot_size(h, degree) + 2 * sizeof(trip_key) + sizeof(int64_t)) +
            chunk_count(s->count, window) * sizeof(chunk) + (s->count + 1) * sizeof(int64_t) +
-           planes_size(degree);
+           planes_size(h, degree);
 }
 
 /* The budget counts whole pages of memory. */
@@ -238,14 +323,23 @@ static uint64_t whole_pages(uint64_t bytes)
     return (bytes + 4095) / 4096 * 4096;
 }
 
-static trip_gaussian_plan plan_of(const steps *s, const trip_gaussian_list *list, int degree)
+static trip_gaussian_plan plan_of(const steps *s, const trip_gaussian_set *set,
+                                  const trip_gaussian_stream_params *p)
 {
-    trip_gaussian_plan plan = { .bricks = s->count, .window_records = window_of(s, list) };
-    for (uint64_t i = 0; i < s->count; i++)
-        plan.records += list->bricks[s->sorted[i].brick].records;
-    for (int n = 0; n <= degree; n++)
-        plan.read_bytes += plan.records * trip_gaussian_plane_bytes((unsigned)n);
-    plan.bytes = whole_pages(s->bytes) + whole_pages(memory_of(s, plan.window_records, degree));
+    const trip_file_gaussian_header *h = &set->header;
+    const trip_gaussian_list *list = &set->lists[p->axis];
+    const int degree = degree_of(set, p);
+    trip_gaussian_plan plan = { .bricks = s->count,
+                                .window_records = window_of(s, list),
+                                .held_records = p->reach > 0 ? held_of(s, list, p) : 0 };
+    for (uint64_t i = 0; i < s->count; i++) {
+        const uint32_t records = list->bricks[s->sorted[i].brick].records;
+        plan.records += records;
+        plan.coarse_records += s->sorted[i].is_coarse ? records : 0;
+    }
+    for (unsigned n = 0; n < trip_gaussian_plane_count(h, degree); n++)
+        plan.read_bytes += plan.records * trip_gaussian_plane_bytes(h, n);
+    plan.bytes = whole_pages(s->bytes) + whole_pages(memory_of(h, s, plan.window_records, degree));
     return plan;
 }
 
@@ -256,7 +350,7 @@ int trip_gaussian_stream_plan(const trip_gaussian_set *set,
     steps s;
     const int status = make_steps(&s, set, params, budget);
     if (status == TRIP_OK)
-        *plan = plan_of(&s, &set->lists[params->axis], degree_of(set, params));
+        *plan = plan_of(&s, set, params);
     free_steps(&s, budget);
     return status;
 }
@@ -289,9 +383,9 @@ static void set_memory(trip_gaussian_stream *s)
     s->free_slots = s->firsts + s->steps.count + 1;
     s->slots = (void *)(s->free_slots + window);
     s->planes[0] = s->slots + window * s->slot_bytes;
-    for (unsigned n = 1; n <= (unsigned)s->degree; n++)
-        s->planes[n] = s->planes[n - 1] +
-                       (size_t)TRIP_GAUSSIAN_BRICK_RECORDS_MAX * trip_gaussian_plane_bytes(n - 1);
+    for (unsigned n = 1; n < s->plane_count; n++)
+        s->planes[n] = s->planes[n - 1] + (size_t)TRIP_GAUSSIAN_BRICK_RECORDS_MAX *
+                                              trip_gaussian_plane_bytes(&s->set->header, n - 1);
     for (uint64_t i = 0; i <= s->steps.count; i++)
         s->firsts[i] = NONE;
     s->free_chunk = NONE;
@@ -307,8 +401,8 @@ static void read_ahead(const trip_gaussian_stream *s, uint64_t i)
     if (i >= s->steps.count)
         return;
     const trip_file_gaussian_brick *b = &s->list->bricks[s->steps.sorted[i].brick];
-    for (int n = 0; n <= s->degree; n++) {
-        const off_t record = (off_t)trip_gaussian_plane_bytes((unsigned)n);
+    for (unsigned n = 0; n < s->plane_count; n++) {
+        const off_t record = (off_t)trip_gaussian_plane_bytes(&s->set->header, n);
         posix_fadvise(s->list->fd[n], (off_t)b->first_record * record, (off_t)b->records * record,
                       POSIX_FADV_WILLNEED);
     }
@@ -317,7 +411,7 @@ static void read_ahead(const trip_gaussian_stream *s, uint64_t i)
 static int take_memory(trip_gaussian_stream *s)
 {
     char needed[32], left[32];
-    s->memory_bytes = memory_of(&s->steps, s->plan.window_records, s->degree);
+    s->memory_bytes = memory_of(&s->set->header, &s->steps, s->plan.window_records, s->degree);
     s->memory = trip_budget_take(s->budget, s->memory_bytes);
     if (s->memory)
         return TRIP_OK;
@@ -341,10 +435,11 @@ int trip_gaussian_stream_open(trip_gaussian_stream **out, const trip_gaussian_se
     s->params.planes = NULL; /* they may not outlive this call */
     s->budget = budget;
     s->degree = degree_of(set, params);
-    s->slot_bytes = slot_size(s->degree);
+    s->slot_bytes = slot_size(&set->header, s->degree);
+    s->plane_count = trip_gaussian_plane_count(&set->header, s->degree);
     int status = make_steps(&s->steps, set, params, budget);
     if (status == TRIP_OK) {
-        s->plan = plan_of(&s->steps, s->list, s->degree);
+        s->plan = plan_of(&s->steps, set, params);
         status = take_memory(s);
     }
     if (status < 0) {
@@ -409,8 +504,8 @@ static void put(trip_gaussian_stream *s, uint64_t i, uint32_t index, double key)
     memcpy(bytes, s->planes[0] + (size_t)index * TRIP_GAUSSIAN_RECORD_BYTES,
            TRIP_GAUSSIAN_RECORD_BYTES);
     bytes += TRIP_GAUSSIAN_RECORD_BYTES;
-    for (int n = 1; n <= s->degree; n++) {
-        const size_t record = trip_gaussian_plane_bytes((unsigned)n);
+    for (unsigned n = 1; n < s->plane_count; n++) {
+        const size_t record = trip_gaussian_plane_bytes(&s->set->header, n);
         memcpy(bytes, s->planes[n] + index * record, record);
         bytes += record;
     }
@@ -421,15 +516,16 @@ static int read_step(trip_gaussian_stream *s, uint64_t i)
 {
     const uint64_t brick = s->steps.sorted[i].brick;
     const trip_file_gaussian_brick *b = &s->list->bricks[brick];
+    const double lead = lead_of(&s->params, b);
     int status = TRIP_OK;
     read_ahead(s, i + READ_AHEAD);
-    for (unsigned n = 0; n <= (unsigned)s->degree && status == TRIP_OK; n++)
+    for (unsigned n = 0; n < s->plane_count && status == TRIP_OK; n++)
         status = trip_gaussian_set_read(s->set, s->params.axis, brick, n, s->planes[n]);
     for (uint32_t j = 0; j < b->records && status == TRIP_OK; j++) {
         double centre[3];
         trip_gaussian_decode_centre(b, s->planes[0] + (size_t)j * TRIP_GAUSSIAN_RECORD_BYTES,
                                     centre);
-        const double key = trip_gaussian_key_of(&s->params.key, centre);
+        const double key = trip_gaussian_key_of(&s->params.key, centre) - lead;
         if (!has_keys(&s->params) || (key >= s->params.key_min && key <= s->params.key_max))
             put(s, i, j, key);
     }
@@ -491,6 +587,16 @@ static int advance(trip_gaussian_stream *s)
     }
 }
 
+/* Returns the entry of the palette for two bytes of a record. A number above the palette's can only
+ * come from a writer that is wrong; it has the last entry. */
+static const unsigned char *entry_of(const trip_gaussian_stream *s, const unsigned char *bytes)
+{
+    const trip_file_gaussian_header *h = &s->set->header;
+    const uint64_t number = trip_gaussian_entry_number(bytes), last = h->palette_count - 1;
+    return s->set->palette +
+           (number < last ? number : last) * trip_gaussian_entry_bytes((int)h->degree);
+}
+
 static void deliver(trip_gaussian_stream *s, trip_gaussian *out, double *key)
 {
     const int64_t at = (int64_t)s->ready[s->ready_next++].number;
@@ -498,8 +604,16 @@ static void deliver(trip_gaussian_stream *s, trip_gaussian *out, double *key)
         __builtin_prefetch(slot_at(s, (int64_t)s->ready[s->ready_next + PREFETCH].number));
     const slot *from = slot_at(s, at);
     const unsigned char *record = (const unsigned char *)(from + 1);
-    trip_gaussian_decode(&s->list->bricks[s->steps.sorted[from->brick].brick], record,
-                         record + TRIP_GAUSSIAN_RECORD_BYTES, s->degree, out);
+    const unsigned char *harmonics = record + TRIP_GAUSSIAN_RECORD_BYTES;
+    const bool palette = s->set->palette != NULL;
+    trip_gaussian_decode(&s->list->bricks[s->steps.sorted[from->brick].brick], record, harmonics,
+                         palette ? 0 : s->degree, out);
+    if (palette && s->degree > 0)
+        trip_gaussian_decode_entry(entry_of(s, harmonics), s->degree, out->sh);
+    const step *of = &s->steps.sorted[from->brick];
+    out->merged = of->is_coarse;
+    if (of->share < 1)
+        out->opacity = 1 - powf(1 - fminf(out->opacity, 0.99f), of->share);
     if (key)
         *key = from->key;
     release_slot(s, at);

@@ -27,16 +27,49 @@ typedef struct trip_gaussian_plane {
 
 enum { TRIP_GAUSSIAN_SIDES = 4, TRIP_GAUSSIAN_PLANES_MAX = 16 };
 
+/* The level of detail. A node is drawn instead of the nodes inside it if its voxels are at most
+ * `voxel_px` pixels wide. The point of the node's box that is nearest to the eye decides. Over the
+ * last quarter of an octave before that width, both are drawn, and share out the optical depth. So
+ * each Gaussian of the scene is drawn once, by itself or by coarse ones. */
+typedef struct trip_gaussian_lod {
+    double voxel_px; /* 0: the Gaussians of the scene alone */
+    double eye[3];
+    bool parallel;
+    /* Pixels of a unit of length: in perspective at distance 1 in the picture's corners, otherwise
+     * anywhere. */
+    double px;
+} trip_gaussian_lod;
+
 /* Zero means the default. */
 typedef struct trip_gaussian_stream_params {
     int axis; /* of the list that is read: 0, 1, 2 */
     trip_gaussian_key key;
     /* Splats with other keys are left out. Both 0 means all keys. */
     double key_min, key_max;
+    /* Keys are less by `reach` times the largest deviation of the brick, plus the greatest value of
+     * `spread` in the brick. So splats come in the order in which a plane meets them. Only for keys
+     * with a direction of unit length. trip_gaussian_plan.held_records counts for a plane that
+     * makes steps of the length `hold`. */
+    double reach, hold;
+    trip_gaussian_key spread;
     const trip_gaussian_plane *planes; /* at most TRIP_GAUSSIAN_PLANES_MAX */
     unsigned plane_count;
+    trip_gaussian_lod lod;
     int degree; /* of the spherical harmonics to read; above the scene's means the scene's */
 } trip_gaussian_stream_params;
+
+/* A walk over the nodes that are drawn. Begin with zeros. */
+typedef struct trip_gaussian_walk {
+    uint64_t node; /* the node found */
+    double share;  /* of its optical depth that is drawn, above 0 */
+    uint64_t next; /* node to look at */
+    uint64_t end;  /* the nodes up to here have the share `rest` */
+    double rest;
+} trip_gaussian_walk;
+
+/* Finds the next node that is drawn. Returns false after the last one. */
+bool trip_gaussian_walk_next(const trip_gaussian_set *set, const trip_gaussian_lod *lod,
+                             trip_gaussian_walk *walk);
 
 /* A view for trip_gaussian_view_planes(). right, down and forward have unit length and are
  * orthogonal. */
@@ -60,12 +93,15 @@ double trip_gaussian_key_of(const trip_gaussian_key *key, const double centre[3]
 /* The size of a stream, from the index alone. */
 typedef struct trip_gaussian_plan {
     uint64_t bricks, records; /* that will be read */
+    uint64_t coarse_records;  /* of these */
     uint64_t window_records;  /* greatest number of splats in the window */
-    uint64_t bytes;           /* of memory that the stream takes from its budget */
-    uint64_t read_bytes;      /* from the disk */
+    /* With `reach`: greatest number of splats that meet the plane during a step. */
+    uint64_t held_records;
+    uint64_t bytes;      /* of memory that the stream takes from its budget */
+    uint64_t read_bytes; /* from the disk */
 } trip_gaussian_plan;
 
-/* Sets *plan. Takes 24 bytes a brick from the budget meanwhile. */
+/* Sets *plan. Takes 96 bytes a brick from the budget meanwhile. */
 int trip_gaussian_stream_plan(const trip_gaussian_set *set,
                               const trip_gaussian_stream_params *params, trip_budget *budget,
                               trip_gaussian_plan *plan);
@@ -74,7 +110,7 @@ int trip_gaussian_stream_plan(const trip_gaussian_set *set,
 int trip_gaussian_stream_open(trip_gaussian_stream **out, const trip_gaussian_set *set,
                               const trip_gaussian_stream_params *params, trip_budget *budget);
 /* Writes the next splats, and their keys unless `keys` is NULL. Sets *got to their number; 0 means
- * the end. */
+ * the end. Splats of coarse levels are marked as merged. */
 int trip_gaussian_stream_next(trip_gaussian_stream *s, trip_gaussian *out, double *keys,
                               size_t room, size_t *got);
 const trip_gaussian_plan *trip_gaussian_stream_planned(const trip_gaussian_stream *s);

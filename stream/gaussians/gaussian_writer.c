@@ -22,17 +22,19 @@ struct trip_gaussian_writer {
     int axis; /* of the open outputs; -1 before the first */
     trip_output planes[TRIP_GAUSSIAN_PLANES];
     trip_output bricks; /* unnamed, of all lists */
+    trip_file_gaussian_node *nodes;
+    trip_gaussian_palette palette;
     uint64_t records[3];
     unsigned char *codes; /* a brick in all planes */
     size_t codes_bytes;
 };
 
 /* Returns the bytes of a record in all planes. */
-static size_t record_bytes(int degree)
+static size_t record_bytes(const trip_file_gaussian_header *h)
 {
     size_t bytes = 0;
-    for (int n = 0; n <= degree; n++)
-        bytes += trip_gaussian_plane_bytes((unsigned)n);
+    for (unsigned n = 0; n < trip_gaussian_plane_count(h, (int)h->degree); n++)
+        bytes += trip_gaussian_plane_bytes(h, n);
     return bytes;
 }
 
@@ -41,7 +43,7 @@ static int begin(trip_gaussian_writer *w, const trip_gaussian_writer_params *par
     int status = trip_folder_begin(&w->folder, params->path, params->replace);
     if (status < 0)
         return status;
-    w->codes_bytes = TRIP_GAUSSIAN_BRICK_RECORDS_MAX * record_bytes(params->degree);
+    w->codes_bytes = TRIP_GAUSSIAN_BRICK_RECORDS_MAX * record_bytes(&w->header);
     w->codes = trip_budget_take(w->budget, w->codes_bytes);
     if (!w->codes)
         return trip_fail(TRIP_ERROR, "brick", params->path,
@@ -84,10 +86,32 @@ const char *trip_gaussian_writer_folder(const trip_gaussian_writer *w)
     return w->folder.partial;
 }
 
+static unsigned plane_count(const trip_gaussian_writer *w)
+{
+    return trip_gaussian_plane_count(&w->header, (int)w->header.degree);
+}
+
+void trip_gaussian_writer_set_palette(trip_gaussian_writer *w, const trip_gaussian_palette *palette)
+{
+    w->palette = *palette;
+    w->header.flags |= TRIP_GAUSSIAN_PALETTE;
+    w->header.palette_count = palette->count;
+}
+
+static void write_entries(const trip_gaussian_writer *w, const unsigned char *const *splats,
+                          unsigned count, unsigned char *to)
+{
+    for (unsigned i = 0; i < count; i++) {
+        const unsigned number = w->palette.find(w->palette.user, splats[i]);
+        *to++ = (unsigned char)number;
+        *to++ = (unsigned char)(number >> 8);
+    }
+}
+
 static int finish_planes(trip_gaussian_writer *w)
 {
     int status = TRIP_OK;
-    for (unsigned n = 0; n <= w->header.degree; n++) {
+    for (unsigned n = 0; n < plane_count(w); n++) {
         trip_output *o = &w->planes[n];
         if (status == TRIP_OK && w->axis >= 0)
             status = trip_output_flush(o);
@@ -103,11 +127,11 @@ static int open_planes(trip_gaussian_writer *w, int axis)
     char name[32];
     int status = finish_planes(w);
     w->axis = axis;
-    for (unsigned n = 0; n <= w->header.degree && status == TRIP_OK; n++)
+    for (unsigned n = 0; n < plane_count(w) && status == TRIP_OK; n++)
         status = trip_output_create(
             &w->planes[n],
             &(trip_output_params){ .folder = w->folder.partial,
-                                   .name = trip_gaussian_plane_name(axis, n, name),
+                                   .name = trip_gaussian_plane_name(&w->header, axis, n, name),
                                    .buffer_bytes = BUFFER_BYTES },
             w->budget);
     return status;
@@ -123,21 +147,58 @@ static void include(trip_file_gaussian_header *h, const trip_file_gaussian_brick
     }
 }
 
-int trip_gaussian_writer_append(trip_gaussian_writer *w, int axis, int size_class,
+void trip_gaussian_writer_set_nodes(trip_gaussian_writer *w, trip_file_gaussian_node *nodes,
+                                    uint64_t count)
+{
+    w->nodes = nodes;
+    w->header.node_count = count;
+}
+
+static void add_to_node(trip_file_gaussian_header *h, trip_file_gaussian_node *n, int axis,
+                        const trip_file_gaussian_brick *b)
+{
+    const bool first = axis == 0 && n->brick_count[axis] == 0;
+    for (int a = 0; a < 3; a++) {
+        n->lo[a] = first ? b->centre_lo[a] : fmin(n->lo[a], b->centre_lo[a]);
+        n->hi[a] = first ? b->centre_hi[a] : fmax(n->hi[a], b->centre_hi[a]);
+    }
+    if (n->brick_count[axis]++ == 0)
+        n->first_brick[axis] = h->brick_count[axis];
+    if (axis == 0 && n->nodes == 1)
+        h->records += b->records;
+}
+
+/* Widens each node by the nodes inside it. They follow it. */
+static void widen_nodes(trip_gaussian_writer *w)
+{
+    for (uint64_t i = w->header.node_count; i-- > 0;) {
+        trip_file_gaussian_node *n = &w->nodes[i];
+        for (uint64_t j = i + 1; j < i + n->nodes; j += w->nodes[j].nodes)
+            for (int a = 0; a < 3; a++) {
+                n->lo[a] = fmin(n->lo[a], w->nodes[j].lo[a]);
+                n->hi[a] = fmax(n->hi[a], w->nodes[j].hi[a]);
+            }
+    }
+}
+
+int trip_gaussian_writer_append(trip_gaussian_writer *w, int axis, uint64_t node, int size_class,
                                 const unsigned char *const *splats, unsigned count)
 {
     unsigned char *planes[TRIP_GAUSSIAN_PLANES] = { w->codes };
     trip_file_gaussian_brick b = { .first_record = w->records[axis], .size_class = size_class };
     int status = axis == w->axis ? TRIP_OK : open_planes(w, axis);
-    for (unsigned n = 1; n <= w->header.degree; n++)
-        planes[n] = planes[n - 1] +
-                    (size_t)TRIP_GAUSSIAN_BRICK_RECORDS_MAX * trip_gaussian_plane_bytes(n - 1);
-    trip_gaussian_encode(&b, splats, count, (int)w->header.degree, planes);
-    for (unsigned n = 0; n <= w->header.degree && status == TRIP_OK; n++)
+    for (unsigned n = 1; n < plane_count(w); n++)
+        planes[n] = planes[n - 1] + (size_t)TRIP_GAUSSIAN_BRICK_RECORDS_MAX *
+                                        trip_gaussian_plane_bytes(&w->header, n - 1);
+    if (w->palette.entries)
+        write_entries(w, splats, count, planes[1]);
+    trip_gaussian_encode(&b, &w->header, splats, count, planes);
+    for (unsigned n = 0; n < plane_count(w) && status == TRIP_OK; n++)
         status = trip_output_append(&w->planes[n], planes[n],
-                                    count * (size_t)trip_gaussian_plane_bytes(n));
+                                    count * (size_t)trip_gaussian_plane_bytes(&w->header, n));
     include(&w->header, &b);
     w->records[axis] += count;
+    add_to_node(&w->header, &w->nodes[node], axis, &b);
     w->header.brick_count[axis]++;
     return status == TRIP_OK ? trip_output_append(&w->bricks, &b, sizeof b) : status;
 }
@@ -150,9 +211,13 @@ static int append_index(trip_gaussian_writer *w, trip_output *index)
     if (!hash)
         return trip_fail(TRIP_ERROR, "brick", w->folder.path, "out of memory");
     XXH64_reset(hash, 0);
+    const size_t nodes_bytes = h->node_count * sizeof *w->nodes;
     int status = trip_output_flush(&w->bricks);
     if (status == TRIP_OK)
         status = trip_output_append(index, h, sizeof *h); /* replaced below */
+    if (status == TRIP_OK)
+        status = trip_output_append(index, w->nodes, nodes_bytes);
+    XXH64_update(hash, w->nodes, nodes_bytes);
     for (uint64_t at = 0; at < w->bricks.bytes && status == TRIP_OK;) {
         const uint64_t left = w->bricks.bytes - at;
         const size_t bytes = left < sizeof piece ? (size_t)left : sizeof piece;
@@ -162,6 +227,11 @@ static int append_index(trip_gaussian_writer *w, trip_output *index)
         XXH64_update(hash, piece, bytes);
         at += bytes;
     }
+    const size_t palette_bytes = h->palette_count * trip_gaussian_entry_bytes((int)h->degree);
+    if (status == TRIP_OK && palette_bytes)
+        status = trip_output_append(index, w->palette.entries, palette_bytes);
+    if (palette_bytes)
+        XXH64_update(hash, w->palette.entries, palette_bytes);
     if (status == TRIP_OK)
         status = trip_output_append(index, w->text, h->text_bytes);
     XXH64_update(hash, w->text, h->text_bytes);
@@ -182,13 +252,17 @@ static void complete_header(trip_gaussian_writer *w, const double lo[3], const d
     memcpy(h->magic, TRIP_GAUSSIAN_MAGIC, sizeof h->magic);
     h->version = TRIP_GAUSSIAN_VERSION;
     h->header_bytes = TRIP_GAUSSIAN_HEADER_BYTES;
-    h->records = w->records[0];
+    h->list_records = w->records[0];
+    h->nodes_offset = at;
+    at += h->node_count * sizeof(trip_file_gaussian_node);
     for (int a = 0; a < 3; a++) {
         h->bricks_offset[a] = at;
         at += h->brick_count[a] * sizeof(trip_file_gaussian_brick);
         h->typical_lo[a] = fmin(fmax(lo[a], h->centre_lo[a]), h->centre_hi[a]);
         h->typical_hi[a] = fmax(fmin(hi[a], h->centre_hi[a]), h->typical_lo[a]);
     }
+    h->palette_offset = h->palette_count ? at : 0;
+    at += h->palette_count * trip_gaussian_entry_bytes((int)h->degree);
     h->text_offset = at;
     h->text_bytes = strlen(w->text);
     h->index_bytes = at + h->text_bytes;
@@ -198,6 +272,7 @@ int trip_gaussian_writer_finish(trip_gaussian_writer *w, const double typical_lo
                                 const double typical_hi[3])
 {
     trip_output index = { .fd = -1 };
+    widen_nodes(w);
     complete_header(w, typical_lo, typical_hi);
     int status = finish_planes(w);
     if (status == TRIP_OK)

@@ -22,9 +22,25 @@ int trip_gaussian_writer_open(trip_gaussian_writer **out, const trip_gaussian_wr
                               trip_budget *budget);
 /* Returns the folder that is being written. Temporary files may lie there. */
 const char *trip_gaussian_writer_folder(const trip_gaussian_writer *w);
+/* The palette of a scene. */
+typedef struct trip_gaussian_palette {
+    const unsigned char *entries; /* see trip_gaussian_encode_entry() */
+    uint64_t count;
+    /* Returns the number of the entry for a splat. */
+    unsigned (*find)(const void *user, const unsigned char *splat);
+    const void *user;
+} trip_gaussian_palette;
+
+/* Stores the coefficients by a palette. Call it before the first brick. All that the palette points
+ * to must outlive the writer. */
+void trip_gaussian_writer_set_palette(trip_gaussian_writer *w,
+                                      const trip_gaussian_palette *palette);
+/* Gives the nodes, which the writer completes with their bricks. They must outlive the writer. */
+void trip_gaussian_writer_set_nodes(trip_gaussian_writer *w, trip_file_gaussian_node *nodes,
+                                    uint64_t count);
 /* Appends a brick to a list. Its records are in order; see trip_gaussian_encode(). Axes ascend from
- * call to call. */
-int trip_gaussian_writer_append(trip_gaussian_writer *w, int axis, int size_class,
+ * call to call, and nodes ascend along an axis. */
+int trip_gaussian_writer_append(trip_gaussian_writer *w, int axis, uint64_t node, int size_class,
                                 const unsigned char *const *splats, unsigned count);
 /* Writes the index and gives the folder its name. The header gets the `typical` bounds. */
 int trip_gaussian_writer_finish(trip_gaussian_writer *w, const double typical_lo[3],

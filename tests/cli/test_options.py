@@ -45,6 +45,7 @@ BRICK = {
     "--code-bits": ["", "12", "0", "byte"],
     "--normals": ["", "nonsense", "3"],
     "--halo": ["", "2", "-1", "yes"],
+    "--harmonics": NAMES + ["exact"],
     "--levels": ["", "-1", "25", "1.5", "yes"],
     "--levels-for": NAMES + ["means"],
     "--resume": None,
@@ -95,6 +96,7 @@ RENDER = {
     "--fov": NUMBERS + ["0", "-5", "180"],
     "--ortho": NUMBERS + ["0", "-5", "Fit"],
     "--orbit": COUNTS + ["1000000"],
+    "--place": ["1", "1,2", "1,2,3,0", "1,2,3,-1", "a,b,c", "1,2,nan", "1,2,3;4,5,6;7,8,9", "1,2,3,4,5"],
     "--path": [],
     "--fps": NUMBERS + ["0", "-1", "1e9"],
     "--in-flight": COUNTS + ["17"],
@@ -128,6 +130,7 @@ RENDER = {
     "--low-pass-width": NUMBERS + ["-1", "17", "none"],
     "--weights": NAMES,
     "--order": NAMES,
+    "--sheet": NUMBERS + ["0", "-1", "1e13"],
     "--sh": NUMBERS + ["-1", "4", "1.5"],
     "--normalise": None,
     "--flatten": NUMBERS + ["0", "0.5", "1e9"],
@@ -423,6 +426,7 @@ class Options(program.ProgramTest):
             "--zoom": ["0.1", "1", "1e3"],
             "--size": ["1x1", "1x50", "50x1", "333x7", "17"],
             "--orbit": ["1", "2"],
+            "--place": ["1,2,3", "1,2,3,0.5"],
             "--orbit=3 --in-flight": ["1", "3", "16"],
             "--tf": [
                 "preset:" + name

@@ -117,7 +117,10 @@ class Points(program.ProgramTest):
         points = numpy.concatenate([grid(60), [[1e7, 0, 0], [0, -1e7, 3], [5e6, 1e7, 1e7]]])
         write_cloud("stray.ply", points)
         write_cloud("clean.ply", grid(60))
-        self.assertLess(numpy.abs(self.front("stray.ply") - self.front("clean.ply")).max(), 2 / 255)
+        # all points have one depth, and strays change the order of their records
+        apart = numpy.abs(self.front("stray.ply") - self.front("clean.ply"))
+        self.assertLess(apart.max(), 0.05)
+        self.assertLess(apart.mean(), 0.002)
         shown = self.picture("stray.ply", "--size", "65x65")
         self.assertGreater((shown[:, :, 3] > 0.5).mean(), 0.2)
 

@@ -21,6 +21,10 @@ class SwitchedOff(program.ProgramTest):
         draw = [program.PROGRAM, "render", "ball.trip", "-o", "x.png", "--size=20x20"]
         self.refused(*draw, "--renderer=gl", says="built without OpenGL")
         self.works(*draw[1:])
+        scene = [program.PROGRAM, "render", os.path.join(program.DATASETS, "donut_slice.ply"), "-o", "s.png",
+                 "--size=20x20"]
+        self.refused(*scene, "--renderer=gl", says="built without OpenGL")
+        self.works(*scene[1:])
 
     def test_missing_viewer_is_refused(self):
         if "VIEW" not in program.SWITCHED_OFF:

@@ -1,10 +1,12 @@
 /* Fuzzes index.trip of Gaussian scenes. The input gets valid checksums and sizes, so that the
  * fuzzer reaches the code behind these checks. The bricks of an accepted index must follow one
- * another, and their records must decode to finite values. */
+ * another, and their records must decode to finite values. At each level of detail, the nodes that
+ * are drawn share out each Gaussian of the scene. */
 #include "fuzz.h"
 
 #include "gaussian_check.h"
 #include "gaussian_code.h"
+#include "gaussian_stream.h"
 
 #include <math.h>
 #include <string.h>
@@ -47,6 +49,19 @@ static void decode(const trip_file_gaussian_brick *b, int degree)
     }
 }
 
+/* All entries of the palette decode to finite coefficients. */
+static void decode_entries(const trip_file_gaussian_header *h, const unsigned char *index)
+{
+    const unsigned bytes = trip_gaussian_entry_bytes((int)h->degree);
+    for (uint64_t i = 0; i < h->palette_count; i++) {
+        float sh[TRIP_SH_MAX][3] = { { 0 } };
+        trip_gaussian_decode_entry(index + h->palette_offset + i * bytes, (int)h->degree, sh);
+        for (int k = 0; k < TRIP_SH_MAX; k++)
+            for (int c = 0; c < 3; c++)
+                FUZZ_PROMISE(isfinite(sh[k][c]));
+    }
+}
+
 static void walk(const trip_file_gaussian_header *h, const unsigned char *index)
 {
     for (int a = 0; a < 3; a++) {
@@ -55,10 +70,29 @@ static void walk(const trip_file_gaussian_header *h, const unsigned char *index)
         for (uint64_t i = 0; i < h->brick_count[a]; i++, b++) {
             FUZZ_PROMISE(b->first_record == next);
             next += b->records;
-            decode(b, (int)h->degree);
+            decode(b, h->palette_count ? 0 : (int)h->degree);
         }
-        FUZZ_PROMISE(next == h->records);
+        FUZZ_PROMISE(next == h->list_records);
     }
+}
+
+/* Walks the drawn nodes, and checks the sum of the shares in each node without others inside. */
+static void walk_levels(const trip_file_gaussian_header *h, const unsigned char *index)
+{
+    const trip_gaussian_set set = { .header = *h,
+                                    .nodes = (const void *)(index + h->nodes_offset) };
+    double *sums = malloc(h->node_count * sizeof *sums);
+    for (double px = 0; px < 4; px = 2 * px + 0.01) {
+        const trip_gaussian_lod lod = { .voxel_px = px, .eye = { 0, 0, px }, .px = 1 };
+        trip_gaussian_walk w = { 0 };
+        memset(sums, 0, h->node_count * sizeof *sums);
+        while (trip_gaussian_walk_next(&set, &lod, &w))
+            for (uint64_t i = w.node; i < w.node + set.nodes[w.node].nodes; i++)
+                sums[i] += w.share;
+        for (uint64_t i = 0; i < h->node_count; i++)
+            FUZZ_PROMISE(set.nodes[i].nodes > 1 || fabs(sums[i] - 1) < 1e-12);
+    }
+    free(sums);
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
@@ -69,8 +103,11 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     trip_file_gaussian_header header;
     memcpy(&header, index, sizeof header);
     if (trip_gaussian_check_header(&header, size, "fuzz") == TRIP_OK &&
-        trip_gaussian_check_tables(index, &header, "fuzz") == TRIP_OK)
+        trip_gaussian_check_tables(index, &header, "fuzz") == TRIP_OK) {
         walk(&header, index);
+        walk_levels(&header, index);
+        decode_entries(&header, index);
+    }
     free(index);
     return 0;
 }

@@ -164,6 +164,74 @@ def draw(scene, view, antialiased=False):
     return numpy.dstack([picture, 1 - passes])
 
 
+def densities(scene, view, at):
+    """Returns the mean depth and the deviation of each Gaussian along the ray of a pixel position.
+    The low-pass filter widens the Gaussians parallel to the picture."""
+    width, height = view["size"]
+    frame = basis_of(view)
+    offset = scene["centre"] - view["eye"]
+    depth = offset @ frame[2]
+    x, y = at[0] - width / 2, at[1] - height / 2
+    if view.get("ortho_height"):
+        pixel = view["ortho_height"] / height
+        offset = offset - pixel * (x * frame[0] + y * frame[1])
+        ray, wide = frame[2], numpy.full(len(depth), pixel)
+    else:
+        pixel = 2 * math.tan(math.radians(view["fov"]) / 2) / height
+        ray, wide = pixel * (x * frame[0] + y * frame[1]) + frame[2], pixel * depth
+    half = rotation_matrices(scene["rotation"]) * scene["deviations"][:, None, :]
+    across = numpy.outer(frame[0], frame[0]) + numpy.outer(frame[1], frame[1])
+    widened = half @ half.transpose(0, 2, 1) + LOW_PASS * (wide ** 2)[:, None, None] * across
+    inverse = numpy.linalg.inv(widened)
+    curvature = numpy.einsum("i,nij,j->n", ray, inverse, ray)
+    return numpy.einsum("i,nij,nj->n", ray, inverse, offset) / curvature, curvature ** -0.5
+
+
+def normal_integral(x):
+    return 0.5 * numpy.vectorize(math.erfc, otypes=[float])(-x / math.sqrt(2))
+
+
+def overlap_at(optical_depths, means, deviations, colours, behind_the_eye, steps=1500):
+    """Integrates normal densities along a ray by many small steps of constant mixture."""
+    reach = numpy.linspace(-6, 6, 60)
+    lo, hi = (means - 6 * deviations).min(), (means + 6 * deviations).max()
+    cuts = numpy.unique(numpy.concatenate(
+        [numpy.linspace(lo, hi, steps), (means[:, None] + deviations[:, None] * reach).ravel()]))
+    if behind_the_eye:
+        cuts = numpy.concatenate([[-math.inf], cuts[cuts > 0]])
+    upto = optical_depths[:, None] * normal_integral((cuts - means[:, None]) / deviations[:, None])
+    parts = numpy.diff(upto, axis=1)
+    sums = parts.sum(0)
+    passes = numpy.exp(-numpy.concatenate([[0], numpy.cumsum(sums)[:-1]]))
+    weights = passes * -numpy.expm1(-sums) / numpy.where(sums > 0, sums, 1)
+    return (weights * parts).sum(1) @ colours
+
+
+def overlap(scene, view):
+    """Returns the integral of overlapping Gaussians, like draw(). Each Gaussian has the optical
+    depth of its alpha. Where several overlap, their colours mix by density."""
+    width, height = view["size"]
+    seen = {key: values[order(scene, view)] for key, values in scene.items()}
+    centres, covariances, opacities, colours = project(seen, view)
+    inverses = numpy.linalg.inv(covariances)
+    picture = numpy.zeros((height, width, 4))
+    for y in range(height):
+        for x in range(width):
+            at = numpy.array([x + 0.5, y + 0.5])
+            d = at - centres
+            power = -0.5 * numpy.einsum("ni,nij,nj->n", d, inverses, d)
+            alpha = numpy.minimum(0.99, opacities * numpy.exp(power))
+            here = alpha >= 1 / 255
+            if not here.any():
+                continue
+            means, deviations = densities({k: v[here] for k, v in seen.items()}, view, at)
+            depths = -numpy.log1p(-alpha[here])
+            picture[y, x, :3] = overlap_at(depths, means, deviations, colours[here],
+                                           not view.get("ortho_height"))
+            picture[y, x, 3] = -math.expm1(-depths.sum())
+    return picture
+
+
 def main():
     def vector(text):
         return numpy.array([float(part) for part in text.split(",")])

@@ -7,8 +7,8 @@
  * - Settings: degree, antialiased, opacity scale, depth, shape.
  * - Each Gaussian in the order of drawing: centre, deviations, rotation, opacity, 48 coefficients.
  *
- * OUT gets 4 floats for each pixel, then the distances with depth. RENDERER is cpu or reference.
- * With REPEATS it draws again and prints the times. */
+ * OUT gets 4 floats for each pixel, then the distances with depth. RENDERER is cpu, gl or
+ * reference. With REPEATS it draws again and prints the times. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -17,6 +17,7 @@
 #include "gaussians_cpu.h"
 #include "gaussians_reference.h"
 #include "pool_runner.h"
+#include "renderer.h"
 
 enum { HEADER = 18, NUMBERS = 59 };
 
@@ -27,6 +28,7 @@ typedef struct run {
     trip_gaussian *gaussians;
     size_t count, batch;
     trip_task_runner runner;
+    const trip_tile_device *device;
     const char *isa;
     float *rgba, *depth;
 } run;
@@ -99,6 +101,7 @@ static void draw_cpu(run *r, bool times)
                                                                    .settings = &r->settings,
                                                                    .budget = r->budget,
                                                                    .runner = &r->runner,
+                                                                   .device = r->device,
                                                                    .isa = r->isa }))
         exit(1);
     const uint64_t added = trip_now_ns();
@@ -107,7 +110,8 @@ static void draw_cpu(run *r, bool times)
                                    r->batch < r->count - i ? r->batch : r->count - i))
             exit(1);
     const uint64_t drawn = trip_now_ns();
-    trip_gaussians_cpu_picture(g, r->rgba, r->depth);
+    if (trip_gaussians_cpu_picture(g, r->rgba, r->depth))
+        exit(1);
     const uint64_t done = trip_now_ns();
     const trip_gaussians_cpu_stats s = trip_gaussians_cpu_get_stats(g);
     if (times)
@@ -150,6 +154,12 @@ int main(int argc, char **argv)
     if (!r.rgba)
         die("no memory");
     r.depth = r.settings.depth ? r.rgba + 4 * pixels : NULL;
+    trip_renderer *gl = NULL;
+    if (strcmp(argv[3], "gl") == 0) {
+        if (trip_gl_create(&gl, r.budget))
+            exit(1);
+        r.device = gl->ops->tile_device(gl);
+    }
     for (int i = 0; i < (repeats ? repeats : 1); i++)
         if (strcmp(argv[3], "reference") == 0)
             draw_reference(&r);
@@ -161,6 +171,8 @@ int main(int argc, char **argv)
         die("cannot write the picture");
     free(r.rgba);
     free(r.gaussians);
+    if (gl)
+        gl->ops->destroy(gl);
     trip_cpu_pool_destroy(pool);
     trip_budget_destroy(r.budget);
     return 0;

@@ -14,6 +14,9 @@ import numpy
 import definition
 
 DRAW = sys.argv.pop()
+sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "cli"))
+import program  # noqa: E402
+
 DATASETS = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "datasets")
 UP = numpy.array([0.0, -1, 0])  # captures are y-down
 MEAN, MOST = 0.1, 2.0  # of 255
@@ -62,7 +65,7 @@ class Definition(unittest.TestCase):
         with tempfile.TemporaryDirectory() as folder:
             dump, out = os.path.join(folder, "scene"), os.path.join(folder, "picture")
             write_dump(dump, scene, view, antialiased)
-            for renderer in ("cpu", "reference"):
+            for renderer in ("cpu", "reference", *program.GL):
                 subprocess.run([DRAW, dump, out, renderer, "2"], check=True)
                 yield renderer, numpy.fromfile(out, "<f4").reshape(height, width, 4)
 
@@ -113,4 +116,4 @@ class Harmonics(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    unittest.main()
+    program.main()

@@ -1,5 +1,6 @@
 #include "test.h"
 
+#include <stdlib.h>
 #include <string.h>
 
 #include "draw_settings.h"
@@ -97,6 +98,70 @@ static void settings_of_splats_are_named(void **state)
     assert_string_equal(draw_settings_of_splats(&s), "traversal");
 }
 
+/* Returns the failure of settings for a kind of data; "" if they apply. */
+static const char *kind_failure(const draw_settings *s, const triptych_resources *r, bool is_scene)
+{
+    trip_scope scope = { .sink = keep }, *before = trip_scope_enter(&scope);
+    line[0] = 0;
+    const int status = draw_settings_check_kind(s, r, is_scene);
+    trip_scope_enter(before);
+    assert_int_equal(status, line[0] ? -2 : 0);
+    return line;
+}
+
+static void settings_of_another_kind_of_data_are_refused_and_dropped(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *options;
+        bool is_scene;
+        const char *says, *kept;
+    } cases[] = {
+        { "--effects occlusion --order lists", true, "--effects: does not apply",
+          " --order lists" },
+        { "--h 0.5", true, "--h: does not apply to scenes with --order depth", "" },
+        { "--h 0.5 --order depth", true, "--h: does not apply", " --order depth" },
+        { "--h 0.5 --method axis --order lists", true, "", " --h 0.5 --method axis --order lists" },
+        { "--kernel fixed --samples 2", true, "fixed does not apply", " --samples 2" },
+        { "--kernel ewa --sh 1", true, "", " --kernel ewa --sh 1" },
+        { "--method image --order lists", true, "image does not apply", " --order lists" },
+        { "--clip-box voxels:0,0,0,1,1,1", true, "voxels: does not apply", "" },
+        { "--clip-box 0,0,0,1,1,1", true, "", " --clip-box 0,0,0,1,1,1" },
+        { "--order depth --quality high", false, "--order: applies to Gaussian scenes only",
+          " --quality high" },
+        { "--sh 0", false, "--sh: applies to Gaussian scenes only", "" },
+        { "--method image --h 0.5", false, "", " --h 0.5 --method image" },
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        const triptych_resources none = { 0 };
+        draw_settings s = { .has_background = 0 };
+        assert_int_equal(draw_settings_read_text(&s, cases[i].options), 0);
+        const char *said = kind_failure(&s, &none, cases[i].is_scene);
+        if (cases[i].says[0] ? !strstr(said, cases[i].says) : said[0] != 0)
+            fail_msg("%s: \"%s\"", cases[i].options, said);
+        draw_settings_drop_kind(&s, cases[i].is_scene);
+        char *kept = draw_settings_text(&s);
+        assert_string_equal(kept, cases[i].kept);
+        free(kept);
+        assert_string_equal(kind_failure(&s, &none, cases[i].is_scene), "");
+    }
+}
+
+static void resources_that_scenes_do_not_use_are_refused(void **state)
+{
+    (void)state;
+    const draw_settings s = { .has_background = 0 };
+    const triptych_resources engine = { .engine = TRIPTYCH_ENGINE_URING };
+    const triptych_resources occluded = { .read_occluded = 1 };
+    const triptych_resources plain = { .engine = TRIPTYCH_ENGINE_PREAD,
+                                       .renderer = TRIPTYCH_RENDERER_REFERENCE };
+    assert_non_null(strstr(kind_failure(&s, &engine, true), "--engine: must be pread"));
+    assert_non_null(strstr(kind_failure(&s, &occluded, true), "--occluded: does not apply"));
+    assert_string_equal(kind_failure(&s, &plain, true), "");
+    assert_string_equal(kind_failure(&s, &engine, false), "");
+    assert_string_equal(kind_failure(&s, &occluded, false), "");
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -104,6 +169,8 @@ int main(void)
         cmocka_unit_test(settings_select_the_renderer_that_they_require),
         cmocka_unit_test(excluded_settings_are_dropped_and_others_stay),
         cmocka_unit_test(settings_of_splats_are_named),
+        cmocka_unit_test(settings_of_another_kind_of_data_are_refused_and_dropped),
+        cmocka_unit_test(resources_that_scenes_do_not_use_are_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -30,6 +30,8 @@ typedef struct scene {
     uint64_t fail_at; /* the source fails there; 0 means never */
     uint64_t cancel_at;
     trip_scope *scope;
+    bool palette;   /* otherwise harmonics are stored whole */
+    uint64_t alike; /* so many splats have the same harmonics; 0 means 1 */
 } scene;
 
 #define TAG 0.01
@@ -66,6 +68,8 @@ static trip_gaussian make_splat(const scene *s, uint64_t i)
     for (int k = 0; k < 4; k++)
         g.rotation[k] = (float)((double)g.rotation[k] / sqrt(length));
     g.opacity = (float)random_of(&state);
+    if (s->alike)
+        state = i / s->alike * 88172645463325252u + 1;
     for (int k = 0; k < trip_sh_count(s->degree); k++)
         for (int c = 0; c < 3; c++)
             g.sh[k][c] = (float)((2 * random_of(&state) - 1) * (k ? 0.3 : 1.7));
@@ -99,6 +103,8 @@ static int brick(scene *s, const char *path, uint64_t memory, uint64_t *peak)
                                         .source = read_scene,
                                         .source_user = s,
                                         .degree = s->degree,
+                                        .harmonics = s->palette ? TRIP_BRICK_HARMONICS_PALETTE
+                                                                : TRIP_BRICK_HARMONICS_WHOLE,
                                         .flags = TRIP_GAUSSIAN_Y_DOWN,
                                         .text = "{\"source\": \"made by numbers\"}" },
         budget, NULL);
@@ -230,6 +236,43 @@ static void a_scene_comes_back_within_the_stated_errors(void **state)
     }
 }
 
+static void a_palette_with_an_entry_for_each_splat_is_exact(void **state)
+{
+    (void)state;
+    for (int degree = 1; degree <= 3; degree++) {
+        scene s = { .count = 30000, .degree = degree, .palette = true };
+        trip_budget *budget;
+        assert_int_equal(brick(&s, NAME, 128 * MIB, NULL), TRIP_OK);
+        trip_gaussian_set *set = open_set(NAME, &budget);
+        assert_int_equal(set->header.flags, TRIP_GAUSSIAN_Y_DOWN | TRIP_GAUSSIAN_PALETTE);
+        assert_int_equal(set->header.palette_count, set->header.list_records);
+        assert_int_equal(trip_gaussian_set_verify(set, budget), TRIP_OK);
+        for (int axis = 0; axis < 3; axis++) {
+            const errors e = stream_and_compare(set, &s, axis, budget);
+            assert_true(e.colour <= 3.4 / 16383 / 2 + 1e-6);
+            assert_true(e.harmonics <= 0.3 / 254 + 1e-6);
+        }
+        close_set(set, budget);
+    }
+}
+
+/* 100000 splats have 1000 different sets of coefficients. Coarse splats have others. */
+static void a_palette_finds_the_sets_that_splats_share(void **state)
+{
+    (void)state;
+    scene s = { .count = 100000, .degree = 2, .palette = true, .alike = 100 };
+    trip_budget *budget;
+    assert_int_equal(brick(&s, NAME, 128 * MIB, NULL), TRIP_OK);
+    trip_gaussian_set *set = open_set(NAME, &budget);
+    assert_in_range(set->header.palette_count, 1000, 1000 + set->header.list_records - s.count);
+    assert_int_equal(set->bytes - 24 * 3 * set->header.list_records <
+                         2 * 3 * set->header.list_records + (UINT64_C(5) << 20),
+                     true);
+    const errors e = stream_and_compare(set, &s, 1, budget);
+    assert_true(e.harmonics <= 0.3 / 254 + 1e-6);
+    close_set(set, budget);
+}
+
 static void large_coordinates_keep_millimetres(void **state)
 {
     (void)state;
@@ -255,7 +298,15 @@ static int compare_decoded(const void *a, const void *b)
     return x->position < y->position ? -1 : x->position > y->position;
 }
 
-/* Reads a whole list by its bricks, and sorts it. */
+static bool is_coarse(const trip_gaussian_set *set, int axis, uint64_t brick)
+{
+    const trip_file_gaussian_node *n = set->nodes;
+    while (brick >= n->first_brick[axis] + n->brick_count[axis])
+        n++;
+    return n->nodes > 1;
+}
+
+/* Reads the Gaussians of the scene from a whole list by its bricks, and sorts them. */
 static decoded *sort_whole(const trip_gaussian_set *set, const trip_gaussian_stream_params *p)
 {
     static unsigned char records[TRIP_GAUSSIAN_BRICK_RECORDS_MAX * TRIP_GAUSSIAN_RECORD_BYTES];
@@ -263,6 +314,8 @@ static decoded *sort_whole(const trip_gaussian_set *set, const trip_gaussian_str
     decoded *all = malloc(set->header.records * sizeof *all), *to = all;
     for (uint64_t i = 0; i < list->brick_count; i++) {
         const trip_file_gaussian_brick *b = &list->bricks[i];
+        if (is_coarse(set, p->axis, i))
+            continue;
         assert_int_equal(trip_gaussian_set_read(set, p->axis, i, 0, records), TRIP_OK);
         for (uint32_t j = 0; j < b->records; j++, to++) {
             trip_gaussian_decode(b, records + (size_t)j * TRIP_GAUSSIAN_RECORD_BYTES, NULL, 0,
@@ -397,10 +450,15 @@ static void little_memory_suffices_and_gives_the_same_bytes(void **state)
     assert_int_equal(brick(&s, OTHER, 400 * MIB, NULL), TRIP_OK);
     assert_same_files(NAME, OTHER, 4);
     s = (scene){ .count = 300000, .degree = 1 };
-    assert_int_equal(brick(&s, NAME, 5 * MIB / 2, &peak), TRIP_OK);
-    assert_true(peak <= 5 * MIB / 2);
+    assert_int_equal(brick(&s, NAME, 3 * MIB, &peak), TRIP_OK);
+    assert_true(peak <= 3 * MIB);
     assert_int_equal(brick(&s, OTHER, 30 * MIB, NULL), TRIP_OK);
     assert_same_files(NAME, OTHER, 7);
+    s = (scene){ .count = 300000, .degree = 1, .palette = true };
+    assert_int_equal(brick(&s, NAME, 14 * MIB, &peak), TRIP_OK);
+    assert_true(peak <= 14 * MIB);
+    assert_int_equal(brick(&s, OTHER, 100 * MIB, NULL), TRIP_OK);
+    assert_same_files(NAME, OTHER, 4);
 }
 
 static void strays_do_no_harm(void **state)
@@ -414,6 +472,8 @@ static void strays_do_no_harm(void **state)
         uint64_t stray = 0;
         for (uint64_t i = 0; i < set->lists[axis].brick_count; i++) {
             const trip_file_gaussian_brick *b = &set->lists[axis].bricks[i];
+            if (is_coarse(set, axis, i))
+                continue;
             if (fabs(b->centre_lo[0]) > 1e7)
                 stray += b->records;
             for (int a = 0; a < 3; a++)
@@ -437,18 +497,23 @@ static void bricks_are_compact_and_full(void **state)
         const trip_gaussian_list *l = &set->lists[axis];
         double volume = 0;
         int classes = 1;
-        assert_in_range(l->brick_count, 80, 140);
+        uint64_t bricks = 0;
         for (uint64_t i = 0; i < l->brick_count; i++) {
             double own = 1;
+            if (is_coarse(set, axis, i))
+                continue;
+            bricks++;
             classes += i && l->bricks[i].size_class != l->bricks[i - 1].size_class;
             for (int a = 0; a < 3; a++)
                 own *= (l->bricks[i].centre_hi[a] - l->bricks[i].centre_lo[a]) /
                        (set->header.centre_hi[a] - set->header.centre_lo[a]);
             volume += own;
         }
+        /* Each node has a brick of each class at least. */
+        assert_in_range(bricks, 98, 220);
+        assert_true(classes <= 6 * (int)set->header.node_count);
         /* Each class fills the scene's box at most once. */
-        assert_in_range(classes, 4, 6);
-        assert_true(volume < classes);
+        assert_true(volume < 6);
     }
     close_set(set, budget);
 }
@@ -637,13 +702,16 @@ static void write_changed(const unsigned char *index, size_t bytes, size_t at, c
 }
 
 #define HEADER(field) offsetof(trip_file_gaussian_header, field)
-#define BRICK(field) (sizeof(trip_file_gaussian_header) + offsetof(trip_file_gaussian_brick, field))
+#define NODE(field) (sizeof(trip_file_gaussian_header) + offsetof(trip_file_gaussian_node, field))
+#define BRICK(field)                                                                               \
+    (sizeof(trip_file_gaussian_header) + sizeof(trip_file_gaussian_node) +                         \
+     offsetof(trip_file_gaussian_brick, field))
 
 static void a_false_index_with_valid_checksums_is_refused(void **state)
 {
     (void)state;
-    const uint32_t four = 4, eight = 8, none = 0, many = 7000;
-    const uint64_t huge = UINT64_C(1) << 60, wrong = 5;
+    const uint32_t four = 4, eight = 8, unknown = 1 << 10, two_up = 4 + 16, none = 0, many = 7000;
+    const uint64_t huge = UINT64_C(1) << 60, wrong = 5, zero = 0;
     const double nan_double = NAN, far = 1e17, low = -1e9;
     const float nan_float = NAN, large = 1e31f, two = 2, hot = 80;
     const int32_t top_class = 100;
@@ -659,7 +727,11 @@ static void a_false_index_with_valid_checksums_is_refused(void **state)
         { HEADER(index_bytes), &wrong, 8, "instead of the 5 in its header" },
         { HEADER(records), &wrong, 8, "another number of records" },
         { HEADER(degree), &four, 4, "above 3" },
-        { HEADER(flags), &eight, 4, "unknown flags" },
+        { HEADER(flags), &unknown, 4, "unknown flags" },
+        { HEADER(flags), &two_up, 4, "two axes point up" },
+        { HEADER(flags), &eight, 4, "entries of the palette" },
+        { HEADER(palette_count), &wrong, 8, "entries of the palette" },
+        { HEADER(palette_offset), &wrong, 8, "palette has a wrong offset" },
         { HEADER(brick_count), &huge, 8, "does not fit the file" },
         { HEADER(bricks_offset), &huge, 8, "wrong offset" },
         { HEADER(text_offset), &huge, 8, "text has a wrong offset" },
@@ -668,6 +740,18 @@ static void a_false_index_with_valid_checksums_is_refused(void **state)
         { HEADER(reach_hi), &far, 8, "bounds of the ellipsoids" },
         { HEADER(typical_lo), &low, 8, "typical bounds" },
         { HEADER(reserved), &one, 1, "reserved bytes" },
+        { HEADER(list_records), &wrong, 8, "another number of records" },
+        { HEADER(node_count), &huge, 8, "number of nodes does not fit" },
+        { HEADER(nodes_offset), &huge, 8, "nodes begin at a wrong offset" },
+        { NODE(lo), &nan_double, 8, "bounds of a node are invalid" },
+        { NODE(hi), &low, 8, "bounds of a node are invalid" },
+        { NODE(width), &far, 8, "width of a node" },
+        { NODE(nodes), &wrong, 8, "beyond the node around it" },
+        { NODE(nodes), &zero, 8, "beyond the node around it" },
+        { NODE(first_brick), &wrong, 8, "do not follow the node before" },
+        { NODE(brick_count), &none, 4, "do not follow the node before" },
+        { NODE(brick_count), &many, 4, "do not follow the node before" },
+        { NODE(level), &four, 4, "level of a node" },
         { BRICK(records), &none, 4, "outside 1 to 6144" },
         { BRICK(records), &many, 4, "outside 1 to 6144" },
         { BRICK(centre_lo), &nan_double, 8, "brick's centres" },
@@ -683,7 +767,7 @@ static void a_false_index_with_valid_checksums_is_refused(void **state)
         { BRICK(opacity_max), &two, 4, "largest opacity" },
         { BRICK(checksums) + 24, &wrong, 8, "file that is absent" },
     };
-    scene s = { .count = 300, .degree = 1 };
+    scene s = { .count = 4000, .degree = 1 }; /* several classes */
     size_t bytes;
     assert_int_equal(brick(&s, NAME, 64 * MIB, NULL), TRIP_OK);
     unsigned char *index = read_file(NAME, "index.trip", &bytes);
@@ -799,6 +883,8 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_scene_comes_back_within_the_stated_errors),
+        cmocka_unit_test(a_palette_with_an_entry_for_each_splat_is_exact),
+        cmocka_unit_test(a_palette_finds_the_sets_that_splats_share),
         cmocka_unit_test(large_coordinates_keep_millimetres),
         cmocka_unit_test(streams_deliver_in_exact_order_in_any_direction),
         cmocka_unit_test(all_splats_at_one_place_keep_their_order),

@@ -11,6 +11,7 @@ import time
 import unittest
 
 import program
+import test_gaussians as gaussians
 
 
 class Browser:
@@ -70,15 +71,17 @@ class Browser:
         os.close(self.answers)
 
 
-class InBrowser(program.ProgramTest):
+class Page(program.ProgramTest):
+    """The page of a data set that write() makes."""
+
     @classmethod
     def setUpClass(cls):
         super().setUpClass()
         executable = shutil.which("chromium") or shutil.which("google-chrome")
         if not executable:
             raise unittest.SkipTest("Chromium is not installed")
-        program.write_nrrd("v.nhdr", program.noise((24, 28, 32)))
-        run = program.call("brick", "v.nhdr", "-o", "v.trip", "-q", "--keep-all")
+        source = cls.write()
+        run = program.call("brick", source, "-o", "v.trip", "-q", *cls.KEPT)
         assert run.returncode == 0, run.stderr
         cls.server = program.start("serve", "v.trip", "--memory", "128M", "--threads", "2")
         address = cls.server.stdout.readline().decode().strip()
@@ -108,6 +111,13 @@ class InBrowser(program.ProgramTest):
         raise AssertionError("no picture comes: " + str(self.browser.value(
             "document.getElementById('state').textContent")))
 
+    def rest(self):
+        """Waits until no more pictures come of what happened before. Returns the address."""
+        now = None
+        while now != (now := self.exact()) or not self.status()["exact"]:
+            time.sleep(0.5)
+        return now
+
     def mouse(self, kind, x, y, **more):
         self.browser.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, **more)
 
@@ -119,11 +129,37 @@ class InBrowser(program.ProgramTest):
             returnByValue=True,
         )["result"]["value"]
 
+    def ready(self, query):
+        """Waits until the control exists, is enabled and is visible."""
+        for _ in range(1000):
+            if self.browser.value(f"(c => !!c && !c.disabled && !c.parentNode.hidden)"
+                                  f"(document.querySelector('{query}'))"):
+                return
+            time.sleep(0.01)
+        raise AssertionError(query)
+
+    def choose(self, query, change):
+        self.ready(query)
+        self.browser.value(f"(c => {{ c.{change}; c.dispatchEvent(new Event('input')); }})"
+                           f"(document.querySelector('{query}'))")
+
+
+class InBrowser(Page):
+    KEPT = ["--keep-all"]
+
+    @staticmethod
+    def write():
+        program.write_nrrd("v.nhdr", program.noise((24, 28, 32)))
+        return "v.nhdr"
+
     def test_each_control_changes_the_picture(self):
         before = self.exact()
         self.browser.value("document.getElementById('panel').open = true")
         for query, value in (
-            ("[data-set=opacity]", "value = '-0.5'"), ("[data-set=no-shading]", "checked = false"),
+            ("[data-set=opacity]", "value = '-0.5'"), ("[data-set=background]", "value = '#203040'"),
+            ("#parallel", "checked = true"), ("#parallel", "checked = false"), ("#clip", "checked = true"),
+            ("#box input", "value = '12'"), ("#clip", "checked = false"),
+            ("[data-set=no-shading]", "checked = false"),
             ("[data-set=no-shading]", "checked = true"), ("#head", "checked = false"),
             ("#round", "value = '90'"), ("#up", "value = '-40'"), ("#head", "checked = true"),
             ("[data-set=classify]", "value = 'post'"), ("[data-set=classify]", "value = 'pre'"),
@@ -134,23 +170,12 @@ class InBrowser(program.ProgramTest):
             ("#shadows", "checked = true"), ("#anisotropy", "value = '0.5'"),
             ("#cueing", "checked = false"), ("#occlusion", "checked = false"),
         ):
-            self.ready(query)
-            self.browser.value(f"(c => {{ c.{value}; c.dispatchEvent(new Event('input')); }})"
-                               f"(document.querySelector('{query}'))")
+            self.choose(query, value)
             before = self.exact(before)
         self.assertEqual(self.status()["effects"], "shadows")
         self.assertEqual(self.shown_effects(), {"shadows": True, "anisotropy": True, "light-cells": True})
         self.assertTrue(self.browser.value("document.getElementById('emission').disabled"))
         self.browser.value("document.getElementById('panel').open = false")
-
-    def ready(self, query):
-        """Waits until the control exists, is enabled and is visible."""
-        for _ in range(1000):
-            if self.browser.value(f"(c => !!c && !c.disabled && !c.parentNode.hidden)"
-                                  f"(document.querySelector('{query}'))"):
-                return
-            time.sleep(0.01)
-        raise AssertionError(query)
 
     def shown_effects(self):
         """Returns the checked boxes and the visible numbers of the effects, once there are two."""
@@ -166,7 +191,7 @@ class InBrowser(program.ProgramTest):
         return shown
 
     def test_drags_keys_and_functions_change_the_picture(self):
-        before = self.exact()
+        before = self.rest()
         cameras = [self.status()["camera"]]
 
         def changed():
@@ -289,6 +314,68 @@ class InBrowser(program.ProgramTest):
             self.assertIn("Hounsfield", said)
         # the note covers parts of the page that other tests click on
         self.browser.value("noted = -NOTE_MS; say('exact')")
+
+
+class SceneInBrowser(Page):
+    KEPT = []
+
+    @staticmethod
+    def write():
+        gaussians.write_scene("v.ply", gaussians.many(500, degree=1), 1)
+        return "v.ply"
+
+    def labels(self):
+        """Returns the labels of the controls that can be seen."""
+        return set(self.browser.value(
+            "[...document.querySelectorAll('#panel label')].filter(l => l.offsetParent !== null)"
+            ".map(l => l.firstChild.textContent.trim())"))
+
+    def test_only_controls_that_apply_are_shown(self):
+        self.exact()
+        self.browser.value("panel.open = document.getElementById('papers').open = true")
+        self.ready("#order")
+        shown = {"Order", "Footprint", "Harmonics", "Opacity", "Background", "Early termination", "Parallel view",
+                 "Clip box"}
+        for order, more in ("depth", set()), ("lists", {"Method", "Blend start (h)"}), ("depth", set()):
+            self.choose("#order", f"value = '{order}'")
+            for _ in range(500):
+                if self.labels() == shown | more:
+                    break
+                time.sleep(0.01)
+            self.assertEqual(self.labels(), shown | more)
+        self.exact()
+
+    def test_each_control_changes_the_picture(self):
+        before = self.exact()
+        for query, value in (
+            ("#order", "value = 'lists'"), ("[data-set=h]", "value = '0.1'"), ("[data-set=method]", "value = 'axis'"),
+            ("#kernel", "value = 'exact'"), ("#sh", "value = '0'"), ("[data-set=opacity]", "value = '0.5'"),
+            ("[data-set=background]", "value = '#203040'"), ("#order", "value = 'depth'"),
+            ("#kernel", "value = ''"), ("#sh", "value = ''"), ("#order", "value = 'lists'"),
+            ("#parallel", "checked = true"), ("#clip", "checked = true"), ("#box input", "value = '0'"),
+            ("#box label:last-child input", "value = '0.1'"),
+        ):
+            self.choose(query, value)
+            before = self.exact(before)
+        camera = self.status()["camera"]
+        for option in "--order lists", "--ortho ", "--clip-box 0,":
+            self.assertIn(option, camera)
+        self.browser.call("Page.reload")
+        self.exact()
+        self.ready("#order")
+        for _ in range(500):
+            said = self.browser.value("state.textContent")
+            if said.startswith("exact, 500 Gaussians by lists, "):
+                break
+            time.sleep(0.01)
+        self.assertTrue(said.startswith("exact, 500 Gaussians by lists, "), said)
+        self.assertEqual(self.browser.value("[order.value, document.querySelector('[data-set=background]').value]"),
+                         ["lists", "#203040"])
+        self.assertEqual(self.browser.value("[parallel.checked, clip.checked, box.hidden, faces[0].value]"),
+                         [True, True, False, "0"])
+        for query, value in ("#order", "value = 'depth'"), ("#clip", "checked = false"), ("#parallel", "checked = false"):
+            self.choose(query, value)
+        self.exact()
 
 
 if __name__ == "__main__":

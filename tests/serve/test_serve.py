@@ -17,6 +17,7 @@ import zlib
 import numpy
 
 import program
+import test_gaussians as gaussians
 
 ANSWER_S = 3  # a request with the token is answered within this time
 STRANGER_S = 5  # whole time of a connection that has not shown the token
@@ -273,6 +274,111 @@ class Serve(program.ProgramTest):
             with self.assertRaises(AssertionError):
                 self.assert_rendered(picture, cold, "--renderer", renderer)
             self.assertEqual(self.status()["effects"], "emission of heat.trip, 500 to 3000 K")
+
+    # ---- Gaussian scenes ----
+
+    def serve_scene(self, *arguments):
+        """Serves a scene in place of the volume, in a small picture."""
+        self.tearDown()
+        if not os.path.exists("scene.ply"):
+            gaussians.write_scene("scene.ply", gaussians.many(800, degree=2), 2)
+            self.works("brick", "scene.ply", "-o", "scene.trip", "-q")
+        self.serve(*(arguments or ["scene.trip"]))
+        self.do("resize 120 90")
+
+    def scene_picture(self, after=0, data="scene.trip"):
+        """Waits for the full picture, and expects the bits of `render`."""
+        picture, number, camera = self.whole_picture(after)
+        while picture.shape[:2] != (90, 120):  # drawn before the change of size
+            picture, number, camera = self.whole_picture(number)
+        self.works("render", data, "-o", "r.png", *shlex.split(camera))
+        with open("r.png", "rb") as f:
+            expected = read_png(f.read())
+        numpy.testing.assert_array_equal(picture[..., :3], expected[..., :3], camera)
+        return picture, number, camera
+
+    def test_each_setting_of_a_scene_equals_render(self):
+        self.serve_scene()
+        before, number, _ = self.scene_picture()
+        scene = self.status()["scene"]
+        self.assertTrue(scene["text"].startswith("800 Gaussians by depth, "), scene["text"])
+        for name, value, says in (
+            *(("order", order, f"--order {order}") for order in self.entries("order")[2:]),
+            ("order", "lists", "--order lists"),
+            ("h", "0.2", "--h 0.2"), ("method", "axis", "--method axis"), ("kernel", "exact", "--kernel exact"),
+            ("kernel", "ewa", "--kernel ewa"), ("sh", "0", "--sh 0"), ("sh", "1", "--sh 1"),
+            ("opacity", "3", "--opacity-scale 3"), ("background", "#204060", "--background"),
+            ("samples", "2", "--samples 2"), ("clip-plane", "1,0,0,0", "--clip-plane 1,0,0,0"),
+            ("early-termination", "0.1", "--early-termination 0.1"),
+        ):
+            self.assertEqual(self.ask("/set", "POST", name=name, value=value)[0], 204, name)
+            picture, number, camera = self.scene_picture(number)
+            self.assertIn(says, camera)
+            self.assertTrue((picture != before).any(), name)
+            before = picture
+        self.do("key o")
+        parallel, number, camera = self.scene_picture(number)
+        self.assertIn("--ortho", camera)
+        self.assertTrue((parallel != before).any())
+        self.assertIn("800 Gaussians by lists", self.status()["scene"]["text"])
+
+    def entries(self, name):
+        choice, = (c for c in self.status()["scene"]["choices"] if c["name"] == name)
+        return [e["value"] for e in choice["entries"]]
+
+    def test_the_page_gets_the_choices_that_the_scene_has(self):
+        self.serve_scene()
+        self.whole_picture()
+        self.assertEqual(self.entries("order"), gaussians.orders())
+        self.assertEqual(self.entries("kernel"), ["", "exact", "ewa"])
+        self.assertEqual(self.entries("sh"), ["", "0", "1"])
+        status = self.status()
+        self.assertEqual({"light", "switches"} & set(status), set())
+        self.assertEqual((status["function"], status["effects"]), ("", ""))
+        applies = status["scene"]["applies"]
+        self.assertIn("background", applies)
+        for name in "h", "method", "classify", "quality", "no-shading", "interpolation", "show", "effects":
+            self.assertNotIn(name, applies)
+
+    def test_what_does_not_apply_to_a_scene_is_refused(self):
+        self.serve_scene()
+        _, number, camera = self.whole_picture()
+        for name, value in (("effects", "occlusion"), ("occlusion", "1"), ("light", "45,30"), ("classify", "post"),
+                            ("h", "0.5"), ("method", "clip"), ("kernel", "fixed"), ("quality", "high"),
+                            ("show", "lists"), ("clip-box", "voxels:0,0,0,1,1,1"), ("order", "nonsense")):
+            self.assertEqual(self.ask("/set", "POST", name=name, value=value)[0], 400, name)
+        self.assertEqual(self.ask("/function", "POST", name="bone")[0], 400)
+        self.assertEqual(self.status()["camera"], camera)
+        self.tearDown()
+        self.serve("v.trip")
+        self.whole_picture()
+        for name, value in ("order", "lists"), ("sh", "0"):
+            self.assertEqual(self.ask("/set", "POST", name=name, value=value)[0], 400, name)
+        for options, says in ((["--tf=bone"], "--tf: does not apply"), (["--effects=occlusion"], "--effects: "),
+                              (["--engine=null"], "--engine: must be pread"), (["--h=0.5"], "--h: does not apply")):
+            for name in "scene.trip", "scene.ply":
+                self.leaves_nothing(2, "serve", name, *options, says=says)
+        self.leaves_nothing(2, "serve", "v.trip", "--order=lists", says="applies to Gaussian scenes only")
+
+    def test_a_scene_file_is_bricked_and_shown(self):
+        self.serve_scene("scene.ply", "--order=lists", "--sh=1")
+        _, _, camera = self.scene_picture(data="scene.ply")
+        self.assertIn("--order lists --sh 1", camera)
+
+    def test_a_fault_of_a_scene_is_a_line_on_stderr(self):
+        self.serve_scene()
+        with open("scene.ply", "rb") as f:
+            program.write("cut.ply", f.read()[:-100])
+        self.serve_scene("cut.ply")
+        for _ in range(200):
+            if self.status()["failed"]:
+                break
+            time.sleep(0.02)
+        self.assertIn("is it truncated?", self.status()["message"])
+        self.server.send_signal(signal.SIGINT)
+        _, err = self.server.communicate(timeout=20)
+        self.assertEqual(self.server.returncode, 0)
+        self.assertTrue(program.LINE.fullmatch(err.decode()), err)
 
     def test_a_volume_is_bricked_and_shown(self):
         cache = tempfile.TemporaryDirectory(prefix="trip-cache-")  # no data set keeps more values

@@ -14,12 +14,25 @@ static void the_box_begins_around_all_voxels_and_is_never_empty(void **state)
 {
     (void)state;
     triptych_clip c = { 0 };
-    trip_clipping_box_of_all(&c, &info);
+    trip_clipping_box_of_all(&c, &info, false);
     assert_true(c.box && c.box_of_voxels && c.box_lo[0] == 1.5 && c.box_hi[2] == 20.5);
-    trip_clipping_set_face(&c, 1, 0, 100);
+    trip_clipping_set_face(&c, 1, 0, 100, 0.01);
     assert_true(c.box_lo[1] < c.box_hi[1] && c.box_hi[1] == 7.5);
-    trip_clipping_set_face(&c, 1, 1, -100);
+    trip_clipping_set_face(&c, 1, 1, -100, 0.01);
     assert_true(c.box_lo[1] < c.box_hi[1] && trip_clipping_is_sound(&c));
+}
+
+static void the_box_of_a_scene_is_in_world_units_with_room_on_each_side(void **state)
+{
+    (void)state;
+    const triptych_info flat = { .lo = { -1, 2, -4 }, .hi = { 3, 2, -1 } };
+    triptych_clip c = { 0 };
+    trip_clipping_box_of_all(&c, &flat, true);
+    assert_true(c.box && !c.box_of_voxels && trip_clipping_is_sound(&c));
+    assert_true(c.box_lo[0] == -2 && c.box_hi[0] == 4);
+    assert_true(c.box_lo[2] == -4.75 && c.box_hi[2] == -0.25);
+    /* Without extent along y, the box has a quarter of half the diagonal, 5, on each side. */
+    assert_true(c.box_lo[1] == 2 - 0.625 && c.box_hi[1] == 2 + 0.625);
 }
 
 static void a_new_plane_cuts_in_front_of_the_look_point(void **state)
@@ -78,6 +91,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(the_box_begins_around_all_voxels_and_is_never_empty),
+        cmocka_unit_test(the_box_of_a_scene_is_in_world_units_with_room_on_each_side),
         cmocka_unit_test(a_new_plane_cuts_in_front_of_the_look_point),
         cmocka_unit_test(a_box_of_voxels_keeps_its_position_in_a_finer_grid),
         cmocka_unit_test(opposite_planes_are_not_interpolated),

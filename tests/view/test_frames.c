@@ -125,9 +125,7 @@ static copy take(trip_frames *f)
 /* A trial could fail here for lack of memory, and the picture would then need less. */
 static draw_settings without_trial(void)
 {
-    return (draw_settings){ .all.samples = 1,
-                            .sheet.samples = 4,
-                            .lod.voxel_px = TRIPTYCH_ZERO };
+    return (draw_settings){ .all.samples = 1, .sheet.samples = 4, .lod.voxel_px = TRIPTYCH_ZERO };
 }
 
 /* Returns whether the library can draw a large picture with this memory if it caches nothing for
@@ -331,6 +329,179 @@ static void a_pixel_of_the_picture_can_be_probed(void **state)
     trip_frames_stop(f);
 }
 
+/* ---- Gaussian scenes ---- */
+
+/* Writes white Gaussians from left to right. Each one is a little farther from the eye. */
+static void brick_scene(const char *name, int count, char path[64])
+{
+    static const char *const names[] = { "x",      "y",       "z",       "f_dc_0",  "f_dc_1",
+                                         "f_dc_2", "opacity", "scale_0", "scale_1", "scale_2",
+                                         "rot_0",  "rot_1",   "rot_2",   "rot_3" };
+    char ply[128];
+    triptych *t;
+    snprintf(ply, sizeof ply, "%s/%s.ply", folder, name);
+    snprintf(path, 64, "%s/%s.trip", folder, name);
+    FILE *f = fopen(ply, "wb");
+    assert_non_null(f);
+    fprintf(f, "ply\nformat binary_little_endian 1.0\nelement vertex %d\n", count);
+    for (int i = 0; i < 14; i++)
+        fprintf(f, "property float %s\n", names[i]);
+    fputs("end_header\n", f);
+    for (int i = 0; i < count; i++) {
+        const float part = (float)i / (float)count;
+        const float row[14] = { 2 * part - 1,
+                                0.3f * (float)(i % 7 - 3) / 3,
+                                0.1f * part,
+                                1.77f,
+                                1.77f,
+                                1.77f,
+                                2,
+                                -1.8f,
+                                -1.8f,
+                                -4,
+                                1 };
+        assert_int_equal(fwrite(row, sizeof row, 1, f), 1);
+    }
+    assert_int_equal(fclose(f), 0);
+    assert_int_equal(triptych_create(&t), 0);
+    assert_int_equal(triptych_brick_gaussians(t, ply, path, NULL, NULL), 0);
+    triptych_destroy(t);
+}
+
+static const double scene_eye[] = { 0, 0, -5 }, scene_look[] = { 0, 0, 0 },
+                    scene_up[] = { 0, -1, 0 };
+static const triptych_view scene_view = {
+    .eye = scene_eye, .look = scene_look, .up = scene_up, .fov_degrees = 30
+};
+
+/* The pictures as the drawing thread shows them. */
+typedef struct shown {
+    trip_frames *frames;
+    uint64_t number;
+    int count;
+    double sum[64]; /* of all channels, relative to the size of the picture */
+    bool whole[64];
+} shown;
+
+static void note_picture(void *user, const trip_picture *p)
+{
+    shown *s = user;
+    double sum = 0;
+    for (int i = 0; i < 4 * p->width * p->height; i++)
+        sum += i % 4 < 3 ? p->rgba[i] : 0;
+    s->number = p->number;
+    if (s->count < 64) {
+        s->sum[s->count] = sum / (p->width * p->height);
+        s->whole[s->count++] = p->whole;
+    }
+}
+
+static void note_news(void *user)
+{
+    shown *s = user;
+    trip_frames_use_picture(s->frames, s->number, note_picture, s);
+}
+
+/* Draws a scene by the slow renderer, and returns the time of its first frame in ms. */
+static double show_slowly(int count, shown *s)
+{
+    char path[64], name[32];
+    trip_frames_status status;
+    snprintf(name, sizeof name, "slow%d", count);
+    brick_scene(name, count, path);
+    *s = (shown){ 0 };
+    s->frames = trip_frames_start(&(trip_frames_params){
+        .renderer = TRIPTYCH_RENDERER_REFERENCE, .wake = note_news, .wake_user = s });
+    assert_non_null(s->frames);
+    trip_wanted w = wanted_of(1, path);
+    w.start = &scene_view;
+    trip_frames_want(s->frames, &w);
+    while (!(status = trip_frames_get_status(s->frames)).moving && !status.failed)
+        nanosleep(&(struct timespec){ .tv_nsec = 1000000 }, NULL);
+    assert_true(!status.failed);
+    trip_frames_stop(s->frames);
+    return status.moving_ms;
+}
+
+static void a_slow_picture_of_a_scene_grows_from_front_to_back(void **state)
+{
+    (void)state;
+    shown s;
+    int count = 20000;
+    while (show_slowly(count, &s) < 800)
+        count *= 2;
+    int parts = 0;
+    while (parts < s.count && !s.whole[parts])
+        parts++;
+    assert_in_range(parts, 4, 63); /* the last one is the whole small frame */
+    for (int i = 1; i < parts; i++)
+        assert_true(s.sum[i] >= s.sum[i - 1]);
+    assert_true(s.sum[0] < 0.6 * s.sum[parts - 1]);
+}
+
+static void a_part_of_a_picture_has_no_statistics(void **state)
+{
+    (void)state;
+    char path[64];
+    triptych *t;
+    float *rgba;
+    triptych_frame_stats stats;
+    triptych_view view = scene_view;
+    view.width = view.height = 40;
+    brick_scene("part", 5000, path);
+    assert_int_equal(triptych_create(&t), 0);
+    assert_int_equal(triptych_open(t, path, NULL), 0);
+    assert_int_equal(triptych_new_picture(t, 40, 40, 4, &rgba), 0);
+    assert_int_equal(triptych_set_view(t, &view), 0);
+    assert_int_equal(triptych_begin(t), 0);
+    assert_int_equal(triptych_step(t, 0), TRIPTYCH_STEP_MORE);
+    assert_int_equal(triptych_picture(t, rgba), 0);
+    assert_int_equal(triptych_get_frame_stats(t, &stats), TRIPTYCH_USAGE);
+    assert_int_equal(triptych_step(t, UINT64_MAX), TRIPTYCH_STEP_DONE);
+    assert_int_equal(triptych_picture(t, rgba), 0);
+    assert_int_equal(triptych_get_frame_stats(t, &stats), 0);
+    assert_int_equal(stats.splats, 5000);
+    triptych_destroy(t);
+}
+
+static void a_scene_is_described_and_drawn_as_by_the_library(void **state)
+{
+    (void)state;
+    char path[64];
+    trip_opened o;
+    brick_scene("scene", 500, path);
+    trip_frames *f = start();
+    trip_wanted w = wanted_of(1, path);
+    trip_frames_want(f, &w);
+    assert_true(await(f, 1).exact);
+    copy c = take(f);
+    assert_drawn_alike(&c, path, &w);
+    assert_true(trip_frames_take_opened(f, &o));
+    assert_true(o.first && o.is_scene && o.scene.gaussians == 500 && o.scene.y_down);
+    assert_true(!o.function && o.histogram.total == 0 && o.info.lo[0] < -0.9 && o.info.hi[0] > 0.9);
+    trip_opened_free(&o);
+    /* Parts that a scene lacks are left out. */
+    trip_wanted others = w;
+    others.function = "bone";
+    others.settings.effects.which = TRIPTYCH_EFFECT_OCCLUSION;
+    others.settings.all.quality = TRIPTYCH_QUALITY_EXACT;
+    others.settings.scene.order = w.settings.scene.order = TRIPTYCH_ORDER_LISTS;
+    trip_frames_want(f, &others);
+    const trip_frames_status s = await(f, 1);
+    assert_true(s.exact && !s.failed);
+    c = take(f);
+    assert_drawn_alike(&c, path, &w);
+    /* So are the parts that a volume lacks. */
+    trip_wanted volume = wanted_of(2, data);
+    volume.settings.scene.order = TRIPTYCH_ORDER_LISTS;
+    trip_frames_want(f, &volume);
+    assert_true(await(f, 2).exact);
+    volume.settings.scene.order = TRIPTYCH_ORDER_DEFAULT;
+    c = take(f);
+    assert_drawn_alike(&c, data, &volume);
+    trip_frames_stop(f);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -342,6 +513,9 @@ int main(void)
         cmocka_unit_test(picture_sizes_and_data_sets_can_alternate),
         cmocka_unit_test(frames_can_be_stopped_at_any_moment),
         cmocka_unit_test(a_pixel_of_the_picture_can_be_probed),
+        cmocka_unit_test(a_slow_picture_of_a_scene_grows_from_front_to_back),
+        cmocka_unit_test(a_part_of_a_picture_has_no_statistics),
+        cmocka_unit_test(a_scene_is_described_and_drawn_as_by_the_library),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

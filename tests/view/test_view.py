@@ -16,6 +16,7 @@ sys.path.insert(0, os.path.join(os.environ["TRIP_SOURCE_DIR"], "tests", "cli"))
 import numpy
 
 import program
+import test_gaussians as gaussians
 
 ROUNDS = int(os.environ.get("TRIP_LIMITS_ROUNDS", "1"))
 WIDTH, HEIGHT, PANEL = 700, 340, 330
@@ -69,6 +70,9 @@ class View(program.ProgramTest):
             assert run.returncode == 0, run.stderr
         program.write_nrrd("heat.nrrd", program.noise((12, 20, 14)))
         run = program.call("brick", "heat.nrrd", "-o", "heat.trip", "--keep-all")
+        assert run.returncode == 0, run.stderr
+        gaussians.write_scene("scene.ply", gaussians.many(800, degree=2), 2)
+        run = program.call("brick", "scene.ply", "-o", "scene.trip", "-q")
         assert run.returncode == 0, run.stderr
 
     @classmethod
@@ -450,7 +454,7 @@ class View(program.ProgramTest):
     def test_the_viewer_survives_random_events(self):
         count = 150 * ROUNDS
         self.view(f"wait\nrandom {count} 1\nwait\nresize 600 400\nwait\nstatus status.json\n"
-                  "key 0\nwait\nscreenshot s.exr\n", "noise.trip", "ball.trip", size="500x300")
+                  "key 0\nwait\nscreenshot s.exr\n", "noise.trip", "ball.trip", "scene.trip", size="500x300")
         status = self.status()
         self.assertTrue(status["exact"] or status["documents"] == 0, status)
 
@@ -514,6 +518,158 @@ class View(program.ProgramTest):
         _, err = process.communicate(timeout=60)
         self.assertEqual(process.returncode, 1, err)
         self.assertIn(b"interrupted", err)
+
+    # ---- Gaussian scenes ----
+
+    def expect_render(self, name, status, data="scene.trip"):
+        """The picture NAME.exr has the bits of `render` with the options of the status."""
+        camera = shlex.split(self.status(status)["camera"])
+        background = [] if "--background" in camera else ["--background=0,0,0"]
+        self.works("render", data, *camera, *background, "-o", "drawn.exr")
+        with open(f"{name}.exr", "rb") as seen, open("drawn.exr", "rb") as drawn:
+            self.assertEqual(seen.read(), drawn.read(), camera)
+
+    def test_each_control_of_a_scene_draws_the_picture_of_render(self):
+        orders = ["depth", *gaussians.orders()[2:], "lists"]
+        controls = [f"click 0.5 Order\nclick 0.5 {name.capitalize()}" for name in orders[1:]]
+        controls += ["click 0.5 Variants of the papers\nclick 0.2 Blend start (h)",
+                     "click 0.5 Method\nclick 0.5 Axis", "click 0.4 Early termination",
+                     "click 0.5 Footprint\nclick 0.5 Exact", "click 0.5 Footprint\nclick 0.5 Ewa",
+                     "click 0.5 Harmonics\nclick 0.5 0", "click 0.5 Harmonics\nclick 0.5 1", "click 0.7 Opacity",
+                     "click 0.9 Antialiasing", "set --background 0.1,0.2,0.3", "click 0.5 Back",
+                     "click 0.5 Parallel", "drag left 100 100 130 120 3", "move 90 90\nwheel 2", "click 0.5 Fit",
+                     "key x", "key z +shift", "click 0.5 Top", "click 0.5 Parallel",
+                     "click 0.5 Clipping\nclick 0.5 Clip the data\nclick 0.5 Clip box\nclick 0.4 x min",
+                     "click 0.6 y max", "click 0.5 Add plane", "click 0.5 Flip 1"]
+        script = "wait\npicture 0.exr\nstatus 0.json\n" + "".join(
+            f"{text}\nwait\npicture {i + 1}.exr\nstatus {i + 1}.json\n" for i, text in enumerate(controls))
+        self.each_changes(script, controls, "scene.trip")
+        for i in range(len(controls) + 1):
+            self.expect_render(i, f"{i}.json")
+        for i, name in enumerate(orders):
+            self.assertEqual(self.status(f"{i}.json")["order"], name)
+
+    def test_controls_that_do_not_apply_to_a_scene_are_hidden(self):
+        self.view("wait\nclick 0.5 Variants of the papers\nwait\nstatus scene.json\nclick 0.5 Order\n"
+                  "click 0.5 Lists\nwait\nstatus lists.json\nkey tab\nwait\nstatus volume.json\n",
+                  "scene.trip", "noise.trip")
+        scene, lists, volume = (set(self.status(f"{n}.json")["controls"]) for n in ("scene", "lists", "volume"))
+        of_volumes = {"Transfer function", "Function editor", "Preset", "Light", "Shading", "Light from the eye",
+                      "Effects", "Quality preset", "Classification", "Interpolation", "Samples per sheet",
+                      "Debug view", "Probe"}
+        of_scenes = {"Scene", "Order", "Footprint", "Harmonics"}
+        of_both = {"Opacity", "Background", "Antialiasing", "Early termination", "Clipping", "Box", "Axes",
+                   "Scale bar", "Parallel", "Fit", "Front"}
+        self.assertEqual(scene & of_volumes, set())
+        self.assertEqual(volume & of_scenes, set())
+        for controls in scene, lists, volume:
+            self.assertEqual(of_both - controls, set())
+        self.assertEqual(of_volumes - volume, set())
+        self.assertEqual(of_scenes - scene, set())
+        for label in "Method", "Blend start (h)":  # a picture by depth has one layer
+            self.assertEqual([label in controls for controls in (scene, lists, volume)], [False, True, True])
+
+    def test_a_scene_without_harmonics_has_no_choice_of_degree(self):
+        gaussians.write_scene("plain.ply", gaussians.many(50))
+        self.view("wait\nstatus status.json\n", "plain.ply")
+        self.assertNotIn("Harmonics", self.status()["controls"])
+        self.assertIn("Order", self.status()["controls"])
+
+    def test_a_scene_file_is_bricked_and_shown(self):
+        self.view("wait\npicture seen.exr\nstatus status.json\n", "scene.ply", "--order=lists")
+        self.assertEqual((self.status()["gaussians"], self.status()["order"]), (800, "lists"))
+        self.expect_render("seen", "status.json", "scene.ply")
+
+    def test_scenes_with_y_down_stand_upright(self):
+        """The red Gaussian has the least y, which is up."""
+        colours = {-1: (1, 0, 0), 0: (0, 1, 0), 1: (0, 0, 1)}
+        rows = [gaussians.row((0, y, 0), colour, 0.9, (0.2, 0.2, 0.2)) for y, colour in colours.items()]
+        gaussians.write_scene("tower.ply", rows)
+        views = ["", "key 1", "key 2", "key 3", "key f", "key o", "key x", "key z", "drag left 100 100 130 104 3"]
+        script = "".join(f"{text}\nwait\npicture {i}.exr\n" for i, text in enumerate(views) if text)
+        pictures = self.pictures("wait\npicture 0.exr\n" + script, range(len(views)), "tower.ply")
+        for picture, name in zip(pictures, views):
+            rows = [(picture[:, :, c].sum(1) * numpy.arange(HEIGHT)).sum() / picture[:, :, c].sum() for c in range(3)]
+            self.assertTrue(rows[0] < rows[1] < rows[2], (name, rows))
+
+    def test_the_state_of_a_scene_is_restored(self):
+        shutil.rmtree("state", ignore_errors=True)
+        last, again = (self.pictures(script + "wait\npicture seen.exr\n", ["seen"], "scene.trip", fresh=False)[0]
+                       for script in ("wait\nset --order lists --kernel ewa --sh 1\nkey 2\n", ""))
+        anew, = self.pictures("wait\npicture seen.exr\n", ["seen"], "scene.trip")
+        self.assertTrue((last == again).all())
+        self.assertTrue((last != anew).any())
+        shutil.rmtree("state")
+
+    def test_marked_views_of_a_scene_are_key_frames(self):
+        for path in glob.glob("scene-*.json"):
+            os.remove(path)
+        self.view("wait\npicture seen.exr\nkey m\n", "scene.trip")
+        self.works("render", "scene.trip", "--path=scene-001.json", f"--size={WIDTH - PANEL}x{HEIGHT}",
+                   "--background=0,0,0", "-o", "marked.exr")
+        flown, = glob.glob("marked*.exr")
+        self.assertTrue((program.read_exr(flown) == program.read_exr("seen.exr")).all())
+
+    def test_scenes_and_volumes_share_a_window(self):
+        script = ("wait\npicture scene.exr\nstatus scene.json\nkey tab\nwait\npicture noise.exr\n"
+                  "status noise.json\nkey tab\nwait\npicture again.exr\n"
+                  f"drop {os.path.abspath('ball.trip')}\nwait\nstatus ball.json\n")
+        self.view(script, "scene.trip", "noise.trip")
+        self.expect_render("scene", "scene.json")
+        self.expect_render("noise", "noise.json", "noise.trip")
+        self.assertTrue((program.read_exr("scene.exr") == program.read_exr("again.exr")).all())
+        self.assertEqual(self.status("ball.json")["dims"], [24, 24, 24])
+        self.assertNotIn("dims", self.status("scene.json"))
+
+    def test_options_that_do_not_apply_are_refused_before_a_window_opens(self):
+        for options, says in self.REFUSED:
+            for name in "scene.trip", "scene.ply":
+                said = self.leaves_nothing(2, "view", name, *options, says=says, env=self.screen.environment).stderr
+                self.assertTrue(program.LINE.fullmatch(said), said)
+        for options in ("--order", "lists"), ("--sh", "1"):
+            self.fails(2, "view", "scene.trip", "noise.trip", *options, says="applies to Gaussian scenes only",
+                       env=self.screen.environment)
+
+    REFUSED = [(["--tf=bone"], "--tf: does not apply"), (["--effects=occlusion"], "--effects: does not apply"),
+               (["--quality=high"], "--quality: does not apply"), (["--engine=io_uring"], "--engine: must be pread"),
+               (["--h=0.5"], "--h: does not apply to scenes with --order depth"),
+               (["--kernel=fixed"], "fixed does not apply"),
+               (["--clip-box=voxels:0,0,0,1,1,1"], "voxels: does not apply")]
+
+    def test_what_does_not_apply_to_an_open_scene_is_said(self):
+        program.write("f.tf", b"triptych 1\n")
+        said = self.view(f"wait\npicture a.exr\nset --effects occlusion\nset --h 0.2\nwait\npicture b.exr\n"
+                         f"drop {os.path.abspath('f.tf')}\nwait\nstatus status.json\npicture c.exr\n"
+                         "screenshot said.exr\n", "scene.trip")
+        self.assertIn("--effects: does not apply to Gaussian scenes", said)
+        self.assertIn("--h: does not apply", said)
+        for name in "b", "c":
+            self.assertTrue((program.read_exr("a.exr") == program.read_exr(f"{name}.exr")).all(), name)
+
+    def test_faults_of_scenes_appear_in_the_window(self):
+        with open("scene.ply", "rb") as f:
+            program.write("cut.ply", f.read()[:-100])
+        shutil.rmtree("spoilt.trip", ignore_errors=True)
+        shutil.copytree("scene.trip", "spoilt.trip")
+        for path in glob.glob("spoilt.trip/*"):
+            if not path.endswith("index.trip"):
+                with open(path, "rb") as f:
+                    data = bytes(byte ^ 255 for byte in f.read())
+                program.write(path, data)
+        self.view(f"wait\ndrop {os.path.abspath('cut.ply')}\nwait\nstatus cut.json\n"
+                  f"drop {os.path.abspath('spoilt.trip')}\nwait\nstatus spoilt.json\n"
+                  "key tab\nwait\nstatus good.json\n", "scene.trip")
+        for name, says in ("cut", "is it truncated?"), ("spoilt", "spoilt.trip"):
+            status = self.status(f"{name}.json")
+            self.assertTrue(status["failed"] and says in status["message"], status)
+        self.assertTrue(self.status("good.json")["exact"])
+
+    def test_short_memory_is_said_in_one_line(self):
+        gaussians.write_scene("many.ply", gaussians.many(20000))
+        self.view("wait\nstatus status.json\n", "many.ply", "--memory=7M")
+        status = self.status()
+        self.assertTrue(status["failed"] and "raise --memory" in status["message"], status)
+        self.assertNotIn("\n", status["message"])
 
 
 skip_what_is_missing()

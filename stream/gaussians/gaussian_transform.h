@@ -12,6 +12,7 @@ typedef struct trip_gaussian_transform {
     bool even;          /* the three axes have one scale */
     double scale;       /* if `even` */
     double rotation[4]; /* w, x, y, z; if `even` */
+    bool turned;        /* the rotation is not the identity */
     trip_harmonics_rotation harmonics;
 } trip_gaussian_transform;
 

@@ -68,6 +68,7 @@ bool trip_gaussian_transform_make(trip_gaussian_transform *t, const double m[3][
     t->even = fabs(length[1] - length[0]) <= 1e-6 * length[0] &&
               fabs(length[2] - length[0]) <= 1e-6 * length[0];
     to_quaternion(r, t->rotation);
+    t->turned = fabs(t->rotation[0]) < 1;
     trip_harmonics_rotation_make(&t->harmonics, (const double(*)[3])r);
     return true;
 }
@@ -195,5 +196,6 @@ void trip_gaussian_transform_apply(const trip_gaussian_transform *t, int degree,
     } else {
         reshape(t, g);
     }
-    trip_harmonics_rotate(&t->harmonics, degree, g->sh);
+    if (t->turned)
+        trip_harmonics_rotate(&t->harmonics, degree, g->sh);
 }

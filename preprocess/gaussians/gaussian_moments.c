@@ -1,0 +1,190 @@
+#include "gaussian_moments.h"
+
+#include <math.h>
+#include <string.h>
+
+#define ALPHA_MIN (1.0 / 255)
+#define ALPHA_MAX 0.99
+/* The coefficient of a colour of 0. Drawing raises lower colours to it. */
+#define BLACK (-0.5 / 0.28209479177387814)
+#define SWEEPS 16
+
+double trip_dilogarithm(double x)
+{
+    if (x > 0.5) {
+        const double rest = 1 - x;
+        return M_PI * M_PI / 6 - (rest > 0 ? log(x) * log(rest) : 0) - trip_dilogarithm(rest);
+    }
+    double sum = 0, power = 1;
+    for (int k = 1; k <= 48; k++) {
+        power *= x;
+        sum += power / (k * k);
+    }
+    return sum;
+}
+
+/* Knud Thomsen's formula for the surface of an ellipsoid. Its error is at most 1.1 %. */
+double trip_gaussian_mean_area(const double s[3])
+{
+    const double p = 1.6075;
+    const double most = fmax(s[0], fmax(s[1], s[2]));
+    if (!(most > 0))
+        return 0;
+    const double x = s[0] / most, y = s[1] / most, z = s[2] / most;
+    return most * most * pow((pow(x * y, p) + pow(x * z, p) + pow(y * z, p)) / 3, 1 / p);
+}
+
+static void covariance_of(const trip_gaussian *g, double s[6])
+{
+    const double w = (double)g->rotation[0], x = (double)g->rotation[1], y = (double)g->rotation[2],
+                 z = (double)g->rotation[3];
+    const double r[3][3] = {
+        { 1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y) },
+        { 2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x) },
+        { 2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y) },
+    };
+    for (int i = 0, at = 0; i < 3; i++)
+        for (int j = i; j < 3; j++, at++) {
+            s[at] = 0;
+            for (int k = 0; k < 3; k++)
+                s[at] += r[i][k] * r[j][k] * (double)g->deviations[k] * (double)g->deviations[k];
+        }
+}
+
+void trip_gaussian_moments_of(const trip_gaussian *g, int degree, trip_gaussian_moments *out)
+{
+    const double deviations[3] = { (double)g->deviations[0], (double)g->deviations[1],
+                                   (double)g->deviations[2] };
+    const double a = 2 * M_PI * trip_gaussian_mean_area(deviations);
+    const double opacity = fmin((double)g->opacity, ALPHA_MAX);
+    *out = (trip_gaussian_moments){ .count = 1, .mass = fmax(0, a * (opacity - ALPHA_MIN)) };
+    if (!(out->mass > 0))
+        return;
+    out->optical = a * (trip_dilogarithm(opacity) - ALPHA_MIN);
+    memcpy(out->centre, g->centre, sizeof out->centre);
+    covariance_of(g, out->spread);
+    for (int i = 0; i < 6; i++)
+        out->spread[i] *= out->mass;
+    for (int k = 0; k < trip_sh_count(degree); k++)
+        for (int c = 0; c < 3; c++)
+            out->colours[k][c] = out->mass * (double)g->sh[k][c];
+    for (int c = 0; c < 3 && degree == 0; c++)
+        out->colours[0][c] = fmax(out->colours[0][c], out->mass * BLACK);
+}
+
+void trip_gaussian_moments_add(trip_gaussian_moments *to, const trip_gaussian_moments *from,
+                               int degree)
+{
+    if (!to->count) {
+        *to = *from;
+        return;
+    }
+    const double mass = to->mass + from->mass, both = to->mass * (from->mass / mass);
+    double apart[3];
+    for (int a = 0; a < 3; a++) {
+        apart[a] = from->centre[a] - to->centre[a];
+        to->centre[a] += apart[a] * (from->mass / mass);
+    }
+    for (int i = 0, at = 0; i < 3; i++)
+        for (int j = i; j < 3; j++, at++)
+            to->spread[at] += from->spread[at] + apart[i] * apart[j] * both;
+    for (int k = 0; k < trip_sh_count(degree); k++)
+        for (int c = 0; c < 3; c++)
+            to->colours[k][c] += from->colours[k][c];
+    to->count += from->count;
+    to->mass = mass;
+    to->optical += from->optical;
+}
+
+/* Turns axes p and q of a symmetric matrix, so that its element (p, q) becomes 0 (Jacobi). */
+static void turn(double m[3][3], double axes[3][3], int p, int q)
+{
+    if (m[p][q] == 0)
+        return;
+    const double theta = (m[q][q] - m[p][p]) / (2 * m[p][q]);
+    const double t = (theta < 0 ? -1 : 1) / (fabs(theta) + hypot(theta, 1));
+    const double c = 1 / hypot(t, 1), s = t * c;
+    for (int k = 0; k < 3; k++) {
+        const double x = m[k][p], y = m[k][q];
+        m[k][p] = c * x - s * y;
+        m[k][q] = s * x + c * y;
+    }
+    for (int k = 0; k < 3; k++) {
+        const double x = m[p][k], y = m[q][k], u = axes[k][p], v = axes[k][q];
+        m[p][k] = c * x - s * y;
+        m[q][k] = s * x + c * y;
+        axes[k][p] = c * u - s * v;
+        axes[k][q] = s * u + c * v;
+    }
+}
+
+/* Sets the unit quaternion of a rotation. */
+static void set_rotation(const double r[3][3], float rotation[4])
+{
+    const double squares[4] = { 1 + r[0][0] + r[1][1] + r[2][2], 1 + r[0][0] - r[1][1] - r[2][2],
+                                1 - r[0][0] + r[1][1] - r[2][2], 1 - r[0][0] - r[1][1] + r[2][2] };
+    int most = 0;
+    for (int i = 1; i < 4; i++)
+        if (squares[i] > squares[most])
+            most = i;
+    const double d[4][4] = {
+        { squares[0], r[2][1] - r[1][2], r[0][2] - r[2][0], r[1][0] - r[0][1] },
+        { r[2][1] - r[1][2], squares[1], r[0][1] + r[1][0], r[0][2] + r[2][0] },
+        { r[0][2] - r[2][0], r[0][1] + r[1][0], squares[2], r[1][2] + r[2][1] },
+        { r[1][0] - r[0][1], r[0][2] + r[2][0], r[1][2] + r[2][1], squares[3] },
+    };
+    double length = 0;
+    for (int i = 0; i < 4; i++)
+        length += d[most][i] * d[most][i];
+    for (int i = 0; i < 4; i++)
+        rotation[i] = (float)(d[most][i] / sqrt(length));
+}
+
+/* Sets the rotation of a covariance, and the deviations along its axes. */
+static void set_axes(const double s[6], float rotation[4], double deviations[3])
+{
+    double m[3][3] = { { s[0], s[1], s[2] }, { s[1], s[3], s[4] }, { s[2], s[4], s[5] } };
+    double axes[3][3] = { { 1, 0, 0 }, { 0, 1, 0 }, { 0, 0, 1 } };
+    for (int i = 0; i < SWEEPS; i++) {
+        turn(m, axes, 0, 1);
+        turn(m, axes, 0, 2);
+        turn(m, axes, 1, 2);
+    }
+    for (int k = 0; k < 3; k++)
+        deviations[k] = sqrt(fmax(0, m[k][k]));
+    set_rotation(axes, rotation);
+}
+
+/* Returns the opacity o from 0 to ALPHA_MAX with Li2(o) = depth. Li2 is convex and ascends. */
+static double opacity_of(double depth)
+{
+    double lo = 0, hi = ALPHA_MAX;
+    for (int i = 0; i < 40; i++) {
+        const double middle = (lo + hi) / 2;
+        if (trip_dilogarithm(middle) < depth)
+            lo = middle;
+        else
+            hi = middle;
+    }
+    return hi;
+}
+
+trip_gaussian trip_gaussian_moments_merge(const trip_gaussian_moments *m, int degree)
+{
+    trip_gaussian g = { .opacity = 0 };
+    double covariance[6], deviations[3];
+    for (int i = 0; i < 6; i++)
+        covariance[i] = m->spread[i] / m->mass;
+    set_axes(covariance, g.rotation, deviations);
+    const double a = 2 * M_PI * trip_gaussian_mean_area(deviations);
+    const double depth = fmin(m->optical / a, 2 * TRIP_MERGED_DEPTH_MAX) + ALPHA_MIN;
+    const double most = trip_dilogarithm(ALPHA_MAX), grow = depth > most ? sqrt(depth / most) : 1;
+    memcpy(g.centre, m->centre, sizeof g.centre);
+    g.opacity = (float)(depth > most ? ALPHA_MAX : opacity_of(depth));
+    for (int k = 0; k < 3; k++)
+        g.deviations[k] = (float)(deviations[k] * grow);
+    for (int k = 0; k < trip_sh_count(degree); k++)
+        for (int c = 0; c < 3; c++)
+            g.sh[k][c] = (float)(m->colours[k][c] / m->mass);
+    return g;
+}

@@ -1,0 +1,47 @@
+/* The octree of a Gaussian scene: cubes around all centres, divided until a cube holds few
+ * Gaussians. A sample of the centres decides where. Nodes stand before the nodes inside them, in
+ * the order of their places. One thread. */
+#ifndef TRIP_GAUSSIAN_OCTREE_H
+#define TRIP_GAUSSIAN_OCTREE_H
+
+#include "budget.h"
+#include "gaussian_tree.h"
+
+enum {
+    TRIP_OCTREE_LEAF_AIM = 1 << 15, /* the most records of a leaf, about */
+    TRIP_OCTREE_DEPTH_MAX = 40,     /* of a leaf */
+    TRIP_OCTREE_BITS = 52,          /* of a place along an axis */
+};
+
+typedef struct trip_octree_node {
+    int64_t children[8]; /* all 0 in a leaf; bit a of the index tells the half along axis a */
+    unsigned depth;
+} trip_octree_node;
+
+/* The place of a centre. Bit 51 tells the half of the whole cube, bit 50 the half of that half. */
+typedef struct trip_octree_place {
+    uint64_t at[3];
+} trip_octree_place;
+
+typedef struct trip_octree {
+    double lo[3], side; /* of the whole cube */
+    trip_octree_node *nodes;
+    uint64_t node_count, room;
+    trip_budget *budget;
+} trip_octree;
+
+/* Builds the octree for centres from `lo` to `hi`. Returns false if the budget is too small. */
+bool trip_octree_build(trip_octree *o, const trip_gaussian_sample *sample, uint64_t records,
+                       const double lo[3], const double hi[3], trip_budget *budget);
+void trip_octree_free(trip_octree *o);
+
+trip_octree_place trip_octree_place_of(const trip_octree *o, const double centre[3]);
+/* Returns the leaf of a place. Writes the nodes from the root to the leaf to `path`, which has room
+ * for TRIP_OCTREE_DEPTH_MAX + 1, unless it is NULL. */
+uint64_t trip_octree_leaf(const trip_octree *o, const trip_octree_place *p, uint64_t *path);
+/* Returns a number that orders the places in a leaf by the octree's next 8 halvings. */
+uint64_t trip_octree_order(const trip_octree_place *p, unsigned depth);
+/* Returns how many halvings two places have in common, at most TRIP_OCTREE_BITS. */
+unsigned trip_octree_common(const trip_octree_place *p, const trip_octree_place *q);
+
+#endif
