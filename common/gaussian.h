@@ -4,7 +4,6 @@
 #ifndef TRIP_GAUSSIAN_H
 #define TRIP_GAUSSIAN_H
 
-#include <stdbool.h>
 #include <stdint.h>
 
 enum { TRIP_SH_DEGREE_MAX = 3, TRIP_SH_MAX = 16 };
@@ -17,9 +16,9 @@ typedef struct trip_gaussian {
     /* Spherical harmonics of the display colour: coefficient, then channel. The colour is 0.5 plus
      * their sum (gaussian_colour.h). Coefficients beyond the scene's degree are 0. */
     float sh[TRIP_SH_MAX][3];
-    /* Trained with a compensated opacity, as trip_gaussian_settings.antialiased says of all. */
-    bool antialiased;
-    uint64_t merged; /* 1: of a coarse level, where it stands for Gaussians of the scene */
+    /* 1: trained with a compensated opacity, as trip_gaussian_settings.antialiased says of all. */
+    uint32_t antialiased;
+    uint32_t merged; /* 1: of a coarse level, where it stands for Gaussians of the scene */
 } trip_gaussian;
 
 /* Returns the number of coefficients up to a degree: 1, 4, 9 or 16. */

@@ -140,7 +140,9 @@ static void scale_colours(trip_point_file *f, float largest)
 
 static float largest_of(const trip_point *p)
 {
-    return fmaxf(p->colour[0], fmaxf(p->colour[1], p->colour[2]));
+    const float *c = p->colour;
+    const float two = c[0] > c[1] ? c[0] : c[1];
+    return two > c[2] ? two : c[2];
 }
 
 /* Guesses the range of the colours from the first points. */
@@ -157,7 +159,8 @@ static int sample_colours(trip_point_file *f)
         memset(batch, 0, BATCH * sizeof *batch);
         status = f->reader->read(f, batch, BATCH, &got);
         for (size_t i = 0; i < got && status == 0; i++)
-            largest = fmaxf(largest, largest_of(&batch[i]));
+            if (largest_of(&batch[i]) > largest)
+                largest = largest_of(&batch[i]);
     }
     free(batch);
     scale_colours(f, largest);
@@ -233,7 +236,7 @@ static bool check(trip_point_file *f, trip_point *p)
         normalise(p->normal);
     for (int c = 0; c < 3; c++) {
         const float v = p->colour[c] * f->colour_factor;
-        p->colour[c] = v > 0 ? fminf(v, 1) : 0; /* 0 for NaN */
+        p->colour[c] = v > 1 ? 1 : v > 0 ? v : 0; /* 0 for NaN */
     }
     p->radius = isfinite(p->radius) && p->radius > 0 ? p->radius : 0;
     p->intensity = isfinite(p->intensity) ? p->intensity : 0;
@@ -274,18 +277,22 @@ typedef struct seen {
     float largest; /* of the colours, unscaled */
 } seen;
 
+/* Conditions are faster than fmin() and fmax() here. All values are finite. */
 static void see(seen *s, const trip_point *p)
 {
     trip_point_info *i = &s->info;
     const bool first = i->points++ == 0;
     for (int a = 0; a < 3; a++) {
-        i->lo[a] = first ? p->position[a] : fmin(i->lo[a], p->position[a]);
-        i->hi[a] = first ? p->position[a] : fmax(i->hi[a], p->position[a]);
+        const double v = p->position[a];
+        i->lo[a] = first || v < i->lo[a] ? v : i->lo[a];
+        i->hi[a] = first || v > i->hi[a] ? v : i->hi[a];
     }
-    i->intensity_lo = first ? p->intensity : fminf(i->intensity_lo, p->intensity);
-    i->intensity_hi = first ? p->intensity : fmaxf(i->intensity_hi, p->intensity);
-    i->time_lo = first ? p->gps_time : fmin(i->time_lo, p->gps_time);
-    i->time_hi = first ? p->gps_time : fmax(i->time_hi, p->gps_time);
+    const float v = p->intensity;
+    const double t = p->gps_time;
+    i->intensity_lo = first || v < i->intensity_lo ? v : i->intensity_lo;
+    i->intensity_hi = first || v > i->intensity_hi ? v : i->intensity_hi;
+    i->time_lo = first || t < i->time_lo ? t : i->time_lo;
+    i->time_hi = first || t > i->time_hi ? t : i->time_hi;
     i->classes[p->classification]++;
     i->returns_max = p->returns > i->returns_max ? p->returns : i->returns_max;
 }
@@ -375,7 +382,7 @@ static int look(trip_point_file *f, trip_point *batch, seen *s)
             const float largest = largest_of(&batch[i]);
             if (!check(f, &batch[i]))
                 continue;
-            s->largest = isfinite(largest) ? fmaxf(s->largest, largest) : s->largest;
+            s->largest = isfinite(largest) && largest > s->largest ? largest : s->largest;
             see(s, &batch[i]);
         }
     }

@@ -95,7 +95,9 @@ static int parse_property(parser *p, char *line)
     trip_ply_property *made = &h->properties[h->property_count];
     *made = (trip_ply_property){ .offset = e->row_bytes, .list = !strcmp(type, "list") };
     if (made->list) {
-        next_word(&line);
+        const char *count = next_word(&line);
+        if (!type_of(count, &made->count_type) || made->count_type >= TRIP_F16)
+            return FAULT("unknown type of the length of a list: %.40s", count);
         type = next_word(&line);
     }
     if (!type_of(type, &made->stated_type))
@@ -239,49 +241,186 @@ const trip_ply_property *trip_ply_property_of(const trip_ply_header *h, const tr
     return NULL;
 }
 
+/* ---- rows ---- */
+
+/* Reads through the file from the end of the header. */
+typedef struct walk {
+    const trip_ply_header *h;
+    const char *path;
+    trip_byte_stream *stream;
+    unsigned char bytes[1 << 14];
+    size_t used, have;
+    uint64_t at; /* in the decompressed file */
+} walk;
+
+/* Takes up to `bytes` bytes. Sets *part_out to their number, and *from to their place. */
+static int take_some(walk *w, uint64_t bytes, const unsigned char **from, size_t *part_out)
+{
+    if (w->used == w->have) {
+        w->used = 0;
+        int status = trip_byte_stream_read_some(w->stream, w->bytes, sizeof w->bytes, &w->have);
+        if (status == 0 && w->have == 0)
+            status = trip_fail(TRIP_ERROR, "read", w->path,
+                               "ends before its vertices; is it truncated?");
+        if (status < 0)
+            return status;
+    }
+    const size_t left = w->have - w->used;
+    *part_out = bytes < left ? (size_t)bytes : left;
+    *from = w->bytes + w->used;
+    w->used += *part_out;
+    w->at += *part_out;
+    return 0;
+}
+
+/* Skips bytes, or copies them if `to` is not NULL. */
+static int pass_bytes(walk *w, uint64_t bytes, unsigned char *to)
+{
+    while (bytes > 0) {
+        const unsigned char *from;
+        size_t part;
+        const int status = take_some(w, bytes, &from, &part);
+        if (status < 0)
+            return status;
+        for (size_t i = 0; i < part && to; i++)
+            *to++ = from[i];
+        bytes -= part;
+    }
+    return 0;
+}
+
+/* Skips a list: its length, then its values. */
+static int pass_list(walk *w, const trip_ply_property *p)
+{
+    unsigned char count[8];
+    const trip_ply_property length = { .type = p->count_type };
+    int status = pass_bytes(w, trip_scalar_bytes(p->count_type), count);
+    if (status < 0)
+        return status;
+    const double values = trip_ply_value(w->h, &length, count);
+    if (values < 0)
+        return trip_fail(TRIP_ERROR, "read", w->path, "a list has the length %.0f", values);
+    return pass_bytes(w, (uint64_t)values * trip_scalar_bytes(p->type), NULL);
+}
+
+/* Each row of a text is a line with a number or more. The line ends in one or two characters. */
+static int pass_line(walk *w)
+{
+    for (bool begun = false;;) {
+        const unsigned char *from;
+        size_t part;
+        const int status = take_some(w, 1, &from, &part);
+        if (status < 0)
+            return status;
+        const bool end = *from == '\n' || *from == '\r';
+        if (end && begun)
+            return 0;
+        begun = begun || !end;
+    }
+}
+
+static int pass_element(walk *w, const trip_ply_element *e)
+{
+    int status = 0;
+    if (!e->lists && !w->h->text) {
+        uint64_t bytes;
+        if (__builtin_mul_overflow(e->count, (uint64_t)e->row_bytes, &bytes))
+            bytes = UINT64_MAX; /* beyond the end of the file */
+        return pass_bytes(w, bytes, NULL);
+    }
+    for (uint64_t row = 0; row < e->count && status == 0; row++) {
+        if (w->h->text)
+            status = pass_line(w);
+        for (uint32_t i = 0; i < e->properties && status == 0 && !w->h->text; i++) {
+            const trip_ply_property *p = &w->h->properties[e->first + i];
+            status = p->list ? pass_list(w, p) : pass_bytes(w, trip_scalar_bytes(p->type), NULL);
+        }
+    }
+    return status;
+}
+
+/* Finds the first row of an element behind others that hold lists. */
+static int find_rows(const trip_ply_header *h, const trip_ply_element *e, const char *path,
+                     uint64_t *at)
+{
+    const trip_byte_source source = { .path = path,
+                                      .encoding = trip_byte_encoding_of(path),
+                                      .skip_bytes = h->bytes,
+                                      .warned = true };
+    walk *w = calloc(1, sizeof *w);
+    if (!w)
+        return trip_fail(TRIP_ERROR, "read", path, "out of memory");
+    w->h = h;
+    w->path = path;
+    w->at = h->bytes;
+    int status = trip_byte_stream_open(&w->stream, &source);
+    for (const trip_ply_element *i = h->elements; i < e && status == 0; i++)
+        status = pass_element(w, i);
+    *at = w->at;
+    trip_byte_stream_close(w->stream);
+    free(w);
+    return status;
+}
+
+static bool lists_before(const trip_ply_header *h, const trip_ply_element *e)
+{
+    for (const trip_ply_element *i = h->elements; i < e; i++)
+        if (i->lists)
+            return true;
+    return false;
+}
+
+/* Returns the bytes of the rows before an element without lists before it, as in memory. Returns
+ * UINT64_MAX for a number that no file has. */
+static uint64_t bytes_before(const trip_ply_header *h, const trip_ply_element *e)
+{
+    uint64_t before = 0, size;
+    for (const trip_ply_element *i = h->elements; i < e; i++) {
+        if (__builtin_mul_overflow(i->count, (uint64_t)i->row_bytes, &size) ||
+            __builtin_add_overflow(before, size, &before) || before > (uint64_t)1 << 60)
+            return UINT64_MAX;
+    }
+    return before;
+}
+
 int trip_ply_stream_open(trip_byte_stream **out, const trip_ply_header *h,
                          const trip_ply_element *e, const char *path)
 {
-    uint64_t before = 0, size = 0;
-    bool fits = true;
-    for (const trip_ply_element *i = h->elements; i <= e; i++) {
-        if (i->lists)
-            return trip_fail(TRIP_ERROR, "read", path,
-                             "the element %s holds a list; rows up to the vertices need one "
-                             "length",
-                             i->name);
-        before += size;
-        fits = fits && !__builtin_mul_overflow(i->count, (uint64_t)i->row_bytes, &size) &&
-               size < (uint64_t)1 << 60 && before < (uint64_t)1 << 60;
-    }
-    if (!fits)
+    const bool far = lists_before(h, e);
+    const uint64_t before = far ? 0 : bytes_before(h, e);
+    uint64_t size = 0, at = h->bytes;
+    if (e->lists)
+        return trip_fail(TRIP_ERROR, "read", path,
+                         "the element %s holds a list; its rows need one length", e->name);
+    if (before == UINT64_MAX || __builtin_mul_overflow(e->count, (uint64_t)e->row_bytes, &size) ||
+        size > (uint64_t)1 << 60)
         return trip_fail(TRIP_ERROR, "read", path,
                          "states %" PRIu64 " rows of %" PRIu32 " bytes; is its header damaged?",
                          e->count, e->row_bytes);
+    int status = far ? find_rows(h, e, path, &at) : 0;
     trip_byte_source source = {
         .path = path,
         .encoding = trip_byte_encoding_of(path),
+        .skip_bytes = at,
         .size_bytes = size,
         .warned = e + 1 < h->elements + h->element_count,
     };
     if (h->text) {
         source.text = TRIP_TEXT_NUMBERS;
         source.text_type = TRIP_F64;
-        source.skip_bytes = h->bytes;
         source.size_bytes += before;
     } else {
-        source.skip_bytes = h->bytes + before;
+        source.skip_bytes += before;
     }
-    int status = trip_byte_stream_open(out, &source);
+    if (status == 0)
+        status = trip_byte_stream_open(out, &source);
     return status == 0 && h->text ? trip_byte_stream_skip(*out, before) : status;
 }
 
 int trip_ply_stream_rewind(trip_byte_stream *s, const trip_ply_header *h, const trip_ply_element *e)
 {
-    uint64_t before = 0;
-    for (const trip_ply_element *i = h->elements; i < e; i++)
-        before += i->count * i->row_bytes;
-    int status = trip_byte_stream_rewind(s);
+    const int status = trip_byte_stream_rewind(s);
+    const uint64_t before = lists_before(h, e) ? 0 : bytes_before(h, e);
     return status == 0 && h->text ? trip_byte_stream_skip(s, before) : status;
 }
 

@@ -17,6 +17,7 @@ typedef struct trip_ply_property {
     trip_scalar stated_type;
     uint32_t offset; /* in a row */
     bool list;
+    trip_scalar count_type; /* of the length of a list */
 } trip_ply_property;
 
 typedef struct trip_ply_element {
@@ -48,7 +49,8 @@ const trip_ply_element *trip_ply_element_of(const trip_ply_header *h, const char
 const trip_ply_property *trip_ply_property_of(const trip_ply_header *h, const trip_ply_element *e,
                                               const char *name);
 
-/* Opens a stream at the first row of an element. In a text, each value of a row is a double. */
+/* Opens a stream at the first row of an element without lists. In a text, each value of a row is a
+ * double. Elements before it may hold lists, which are read through. */
 int trip_ply_stream_open(trip_byte_stream **out, const trip_ply_header *h,
                          const trip_ply_element *e, const char *path);
 int trip_ply_stream_rewind(trip_byte_stream *s, const trip_ply_header *h,

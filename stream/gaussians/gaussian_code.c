@@ -307,7 +307,7 @@ void trip_gaussian_decode(const trip_file_gaussian_brick *b, const unsigned char
 {
     const words r = load(record);
     memset(out->sh, 0, sizeof out->sh);
-    out->merged = 0;
+    out->merged = out->antialiased = 0;
     trip_gaussian_decode_centre(b, record, out->centre);
     for (int a = 0; a < 3; a++)
         out->deviations[a] = decode_deviation(b, bits(r.w[2], (unsigned)(12 * a), 12));

@@ -245,7 +245,7 @@ static int read_part(const trip_placed_stream *s, part *p, trip_gaussian *out, d
     const int status = trip_gaussian_stream_next(p->stream, out, keys, room, got);
     for (size_t i = 0; i < *got && !status; i++) {
         trip_gaussian_transform_apply(&set->placement, degree, &out[i]);
-        out[i].antialiased = h->flags & TRIP_GAUSSIAN_ANTIALIASED;
+        out[i].antialiased = (h->flags & TRIP_GAUSSIAN_ANTIALIASED) != 0;
     }
     if (s->drawn)
         s->drawn[p->number] += *got;

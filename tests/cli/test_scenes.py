@@ -95,6 +95,42 @@ def write_spz(path, count, seed):
             "sh": ((colour / 255 - 0.5) / 0.15)[:, None, :]}
 
 
+def rays_of(view):
+    """Returns the origins and the directions of the pixels, with depth 1 along each direction."""
+    width, height = view["size"]
+    right, down, forward = definition.basis_of(view)
+    if view.get("ortho_height"):
+        step = view["ortho_height"] / height
+    else:
+        step = 2 * math.tan(math.radians(view["fov"]) / 2) / height
+    x = (numpy.arange(width) + 0.5 - width / 2)[None, :, None] * step * right
+    y = (numpy.arange(height) + 0.5 - height / 2)[:, None, None] * step * down
+    if view.get("ortho_height"):
+        return view["eye"] + x + y, numpy.broadcast_to(forward, (height, width, 3))
+    return numpy.broadcast_to(view["eye"], (height, width, 3)), forward + x + y
+
+
+def depths_within(view, lo, hi):
+    """Returns the view depths at which the rays enter and leave a box."""
+    origin, direction = rays_of(view)
+    with numpy.errstate(divide="ignore", invalid="ignore"):
+        a, b = (numpy.array(lo) - origin) / direction, (numpy.array(hi) - origin) / direction
+    enters, leaves = numpy.fmin(a, b).max(2), numpy.fmax(a, b).min(2)
+    return enters, numpy.maximum(enters, leaves), numpy.linalg.norm(direction, axis=2)
+
+
+def over(front, back):
+    return front + (1 - front[:, :, 3:]) * back
+
+
+def fog(length, *kinds):
+    """Returns the picture of fogs that fill the same length. A kind is an opacity per unit, and a colour."""
+    taus = numpy.array([-math.log(1 - opacity) for opacity, _ in kinds])
+    colour = sum(tau * numpy.array(colour) for tau, (_, colour) in zip(taus, kinds)) / max(taus.sum(), 1e-300)
+    alpha = -numpy.expm1(-taus.sum() * length)
+    return numpy.dstack([alpha[:, :, None] * colour, alpha])
+
+
 class Scenes(program.ProgramTest):
     def setUp(self):
         """Writes three scenes, and places them between one another."""
@@ -146,7 +182,7 @@ class Scenes(program.ProgramTest):
                 self.expect(*pictures, order)
                 seen = pictures[0][:, :, 3] > 0.1
                 self.assertGreater(seen.sum(), 500)
-                apart = numpy.abs(distances[1] / distances[0] - 1)[seen]
+                apart = numpy.abs(distances[1][seen] / distances[0][seen] - 1)
                 self.assertLess(numpy.quantile(apart, 0.99), 0.005)
                 self.assertLess(apart.max(), 0.05)
 
@@ -174,6 +210,29 @@ class Scenes(program.ProgramTest):
             write_objects("both.json", *({"data": name} for name in objects))
             self.expect(expected, self.picture("both.json", *options_of(view)), objects)
 
+    def test_a_placed_scene_has_the_coarse_gaussians_of_the_moved_view(self):
+        """The scene from the eye in its own space has the same rays, so coarse Gaussians stand for the same."""
+        rows = numpy.array(many(60000, seed=7))
+        rows[:, 7:10] = math.log(0.012)
+        write_scene("far.ply", rows)
+        turn, move, scale = turn_of((1, 2, -0.5), 70), numpy.array([0.5, -0.2, 0.3]), 0.5
+        write_objects("far.json", {"data": "far.ply", "translate": move.tolist(), "scale": scale,
+                                   "rotate": {"axis": [1, 2, -0.5], "degrees": 70}})
+        for more in {}, {"ortho_height": 4}:
+            view = view_of((8, -6, 9), size=(80, 60), fov=20, **more)
+            own = view_of(turn.T @ (view["eye"] - move) / scale, turn.T @ (view["look"] - move) / scale,
+                          turn.T @ view["up"], view["size"], view["fov"], **{k: v / scale for k, v in more.items()})
+            pictures, counts = [], []
+            for name, of in ("far.ply", own), ("far.json", view):
+                pictures.append(self.picture(name, *options_of(of), "--lod", 8))
+                counts.append([self.stats(name, *options_of(of), "--lod", lod)["frames"][0]["gaussians"]
+                               for lod in range(1, 9)])
+            self.assertEqual(*counts)
+            self.assertGreater(len(set(counts[0])), 2)  # at first only some are coarse
+            self.expect(*pictures, more)
+            self.assertGreater(255 * numpy.abs(self.picture("far.json", *options_of(view), "--lod", 0)
+                                               - pictures[1]).max(), 1)
+
     def test_the_order_of_the_objects_changes_no_bit(self):
         view = options_of(view_of((1.5, -1, 3)))
         one = self.picture("scene.json", *view)
@@ -199,6 +258,139 @@ class Scenes(program.ProgramTest):
         self.works("render", "scene.json", "--size", "40", "--path", "way.json", "-o", "f.exr")
         alone = self.picture("scene.json", *options_of(view_of((1, 0, 4), size=(40, 40), fov=40)))
         numpy.testing.assert_allclose(program.read_exr("f-002.exr"), alone, atol=1e-3)
+
+    # ---- volumes ----
+
+    RED, BLUE = (0.06, (0.9, 0.3, 0.1)), (0.03, (0.1, 0.4, 0.9))  # opacity per voxel, and colour
+
+    def fog_box(self, name, shape, value):
+        """Writes a constant volume. Its matter fills the box between its outer voxel centres."""
+        program.write_nrrd(name, numpy.full(shape[::-1], value, "u1"))
+        entries = ((7, self.RED), (9, self.BLUE))
+        lines = [" ".join(map(str, (v + d, *colour, opacity))) for v, (opacity, colour) in entries for d in (-0.5, 0.5)]
+        program.write("fog.tf", "\n".join(["values data", "unit voxel", *lines, ""]).encode())
+        return "--tf", "fog.tf", "--no-shading"
+
+    def fog_views(self, middle):
+        """From the front, oblique, parallel, and from inside."""
+        x, y, z = middle
+        yield view_of((x, y, z + 90), middle, up=(0, 1, 0), fov=30)
+        yield view_of((x + 50, y + 35, z + 60), middle, up=(0, 1, 0), fov=30)
+        yield view_of((x + 50, y - 25, z - 60), middle, up=(0, 1, 0), ortho_height=40)
+        yield view_of((x - 3, y + 2, z + 8), (x, y, z - 9), up=(0, 1, 0), fov=60)
+
+    def test_gaussians_before_in_and_behind_fog_follow_the_closed_form(self):
+        """The fog up to the depth of a centre attenuates the Gaussian, in oblique views and from inside too."""
+        look = self.fog_box("box.nrrd", (24, 30, 33), 7)
+        lo, hi = numpy.zeros(3), numpy.array([23, 29, 32.0])
+        centres = [(12, 15, 45), (10, 14, 23.4), (14, 16, 9.7), (11, 13, -12)]
+        colours = [(0.1, 0.9, 0.2), (0.2, 0.3, 0.9), (0.9, 0.9, 0.1), (0.9, 0.1, 0.9)]
+        write_scene("dots.ply", [row(c, rgb, 0.7, (4, 3, 3.5)) for c, rgb in zip(centres, colours)])
+        dots = definition.read_ply("dots.ply")
+        write_objects("fog.json", {"data": "box.nrrd"}, {"data": "dots.ply"})
+        for view in self.fog_views((12, 15, 16)):
+            enters, leaves, stretch = depths_within(view, lo, hi)
+            enters, leaves = numpy.maximum(enters, 0), numpy.maximum(leaves, 0)
+
+            truth, at = numpy.zeros((*view["size"][::-1], 4)), enters
+            for i in definition.order(dots, view):
+                depth = (dots["centre"][i] - view["eye"]) @ definition.basis_of(view)[2]
+                until = numpy.clip(depth, at, leaves)
+                truth = over(truth, fog((until - at) * stretch, self.RED))
+                truth = over(truth, definition.draw({k: v[i:i + 1] for k, v in dots.items()}, view))
+                at = until
+            truth = over(truth, fog((leaves - at) * stretch, self.RED))
+            picture = self.picture("fog.json", *look, *options_of(view), "--early-termination", 0)
+            apart = 255 * numpy.abs(picture - truth)
+            wrong = over(definition.draw(dots, view), fog((leaves - enters) * stretch, self.RED))
+            self.assertGreater(255 * numpy.abs(wrong - truth).max(), 20)
+            self.assertLess(apart.mean(), MEAN)
+            self.assertLess(apart.max(), 0.3)
+
+    def test_two_fogs_within_one_another_follow_the_closed_form(self):
+        """Where both are, their extinctions add up. The second one is turned, and scaled by 0.5: its opacity
+        per voxel stays."""
+        look = self.fog_box("red.nrrd", (24, 30, 33), 7)
+        self.fog_box("blue.nrrd", (40, 36, 44), 9)
+        turn, move, scale = turn_of((1, 1, 0.3), 40), numpy.array([2, 14, 4.0]), 0.5
+        matrix = numpy.eye(4)
+        matrix[:3, :3], matrix[:3, 3] = scale * turn, move
+        objects = [{"data": "red.nrrd"}, {"data": "blue.nrrd", "matrix": matrix.ravel().tolist()}]
+        write_objects("fogs.json", *objects)
+        write_objects("back.json", *objects[::-1])
+        for view in self.fog_views((12, 15, 16)):
+            own = view_of(turn.T @ (view["eye"] - move) / scale, turn.T @ (view["look"] - move) / scale,
+                          turn.T @ view["up"], view["size"], view["fov"])
+            if view.get("ortho_height"):
+                own["ortho_height"] = view["ortho_height"] / scale
+            red = depths_within(view, (0, 0, 0), (23, 29, 32))
+            blue = depths_within(own, (0, 0, 0), (39, 35, 43))
+            spans = [(red[0], red[1], red[2], self.RED), (blue[0] * scale, blue[1] * scale, blue[2] / scale, self.BLUE)]
+            ends = numpy.sort(numpy.maximum([end for span in spans for end in span[:2]], 0), axis=0)
+            truth = numpy.zeros((*view["size"][::-1], 4))
+            for a, b in zip(ends, ends[1:]):
+                lengths = [numpy.where((from_ < b) & (to > a), (b - a) * stretch, 0) for from_, to, stretch, _ in spans]
+                taus = [-math.log(1 - kind[0]) * length for (*_, kind), length in zip(spans, lengths)]
+                alpha = -numpy.expm1(-sum(taus))
+                colour = sum(tau[:, :, None] * numpy.array(kind[1]) for (*_, kind), tau in zip(spans, taus))
+                colour /= numpy.maximum(sum(taus), 1e-300)[:, :, None]
+                truth = over(truth, numpy.dstack([alpha[:, :, None] * colour, alpha]))
+            alone = [self.picture(o["data"], *look, *options_of(view)) for o in objects[:1]]
+            self.assertGreater(255 * numpy.abs(alone[0] - truth).max(), 20)
+            for name in "fogs.json", "back.json":
+                apart = 255 * numpy.abs(self.picture(name, *look, *options_of(view), "--early-termination", 0) - truth)
+                self.assertLess(apart.mean(), MEAN)
+                self.assertLess(apart.max(), 0.5)
+
+    def test_a_volume_alone_is_drawn_as_without_a_scene_file(self):
+        """A placement of the volume and of the view by powers of two gives the same rays."""
+        look = self.fog_box("alone.nrrd", (20, 18, 16), 9)
+        matrix = numpy.diag([2.0, 2, 2, 1])
+        write_objects("alone.json", {"data": "alone.nrrd", "matrix": matrix.ravel().tolist()})
+        view, there = view_of((30, 20, 40), (10, 9, 8)), view_of((60, 40, 80), (20, 18, 16))
+        a = self.picture("alone.nrrd", *look, *options_of(view), "--background", "0,0,0,0")
+        b = self.picture("alone.json", *look, *options_of(there))
+        self.assertGreater(a[:, :, 3].max(), 0.2)
+        self.assertLess(255 * numpy.abs(a - b).max(), 0.5)
+
+    def test_clip_planes_cut_volumes_and_scenes_alike(self):
+        look = self.fog_box("cut.nrrd", (24, 24, 24), 9)
+        write_scene("cut.ply", [row((6, 12, 12), (0, 1, 0), 0.9, (2, 2, 2)), row((18, 12, 12), (1, 0, 0), 0.9, (2, 2, 2))])
+        write_scene("left.ply", [row((6, 12, 12), (0, 1, 0), 0.9, (2, 2, 2))])
+        program.write_nrrd("half.nrrd", numpy.full((24, 24, 13), 9, "u1"))
+        turned = {"rotate": {"axis": [0, 0, 1], "degrees": 90}, "translate": [23, 0, 0]}
+        write_objects("cut.json", {"data": "cut.nrrd", **turned}, {"data": "cut.ply"})
+        write_objects("half.json", {"data": "half.nrrd"}, {"data": "left.ply"})
+        view = options_of(view_of((12, 30, 70), (12, 12, 12), up=(0, 1, 0), fov=40))
+        cut = self.picture("cut.json", *look, *view, "--clip-plane=-1,0,0,12")
+        half = self.picture("half.json", *look, *view)
+        self.assertGreater(half[:, :, 3].max(), 0.8)
+        self.assertLess(255 * numpy.abs(cut - half).mean(), 0.3)
+        self.assertLess(255 * numpy.abs(cut - half).max(), 6)
+
+    def test_volumes_beside_scenes_in_turntables_memory_and_threads(self):
+        look = self.fog_box("mixed.nrrd", (40, 40, 40), 7)
+        write_objects("mixed.json", {"data": "mixed.nrrd", "scale": 0.05, "translate": [-1, -1, -1]}, *self.objects)
+        self.works("render", "mixed.json", *look, "--size", "40", "--orbit", "2", "-o", "o.exr")
+        run = self.works("render", "mixed.json", *look, "--size", "40", "--orbit", "2", "-o", "p.exr", "--stats", "-")
+        stats = json.loads(run.stdout)
+        for i, frame in enumerate(stats["frames"]):
+            alone = self.picture("mixed.json", *look, *frame["camera"].split())
+            numpy.testing.assert_allclose(program.read_exr(f"o-{i:03}.exr"), alone, atol=1e-4)
+            self.assertEqual(frame["gaussians"], 4800)
+        self.assertLess(stats["memory_peak_bytes"], stats["memory_limit_bytes"])
+        one, *others = (self.picture("mixed.json", *look, "--size", "150x130", *o)
+                        for o in ((), ("--threads", "1"), ("--threads", "5"), ("--memory", "100M")))
+        for other in others:
+            self.assertTrue((one == other).all())
+        stats = self.stats("mixed.json", *look, "--size", "150x130", "--memory", "100M")
+        self.assertEqual(stats["memory_limit_bytes"], 100 << 20)
+        self.assertLessEqual(stats["memory_peak_bytes"], 100 << 20)
+        if not program.SANITIZED:
+            self.assertLess(stats["peak_rss_bytes"], 132 << 20)
+        fine = self.picture("mixed.json", *look, "--size", "64", "--samples", "2")
+        coarse = self.picture("mixed.json", *look, "--size", "64")
+        self.assertTrue(0 < 255 * numpy.abs(fine - coarse).mean() < 6)
 
     # ---- runs ----
 
@@ -310,6 +502,10 @@ class Scenes(program.ProgramTest):
             self.leaves_nothing(2, *command, says="scene.json: is a scene file; `triptych render` draws it")
         self.leaves_nothing(2, "render", "scene.json", "-o", "x.png", "--spacing", "1,1,1", says="--spacing")
         self.leaves_nothing(2, "render", "scene.json", "-o", "x.png", "--classify", "pre", says="--classify")
+        for name in "scene.json", "c.trip":
+            self.leaves_nothing(2, "render", name, "-o", "x.png", "--clip-box", "voxels:0,0,0,1,1,1",
+                                says="voxels: does not apply")
+        self.leaves_nothing(2, "info", "--verify", "scene.json", says="--verify: applies to data sets only")
         self.leaves_nothing(2, "render", "scene.json", "c.trip", "-o", "x.png", says="scene file")
 
 

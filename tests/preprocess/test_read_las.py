@@ -64,11 +64,14 @@ class Las(PointTest):
             self.assertEqual(made.notes, ["667 of 2000 points are marked as withheld; they are left out"])
 
     def test_every_point_format_of_laz(self):
-        for kind, extra in (0, 0), (1, 3), (2, 0), (3, 3), (6, 0), (7, 3), (8, 0):
+        """"_plain" has no chunks, and "_v4" has version 4 of the items."""
+        for kind, extra, more in ((0, 0, ""), (1, 3, ""), (2, 0, ""), (3, 3, ""), (3, 1, "_plain"),
+                                  (4, 0, ""), (5, 2, ""), (6, 0, ""), (7, 3, ""), (7, 1, "_v4"),
+                                  (8, 0, ""), (9, 0, ""), (10, 2, "")):
             records = records_of(kind, COUNT, extra)
-            made = self.read_path(os.path.join(FILES, f"synthetic_{kind}.laz"))
+            made = self.read_path(os.path.join(FILES, f"synthetic_{kind}{more}.laz"))
             self.check(made, kind, records)
-            self.assertRegex(made.format, rf"LAZ 1.[34], point format {kind}$")
+            self.assertRegex(made.format, rf"LAZ 1.[234], point format {kind}$")
 
     def test_a_laz_file_equals_its_las_file(self):
         a, b = (self.read_path(os.path.join(FILES, "extrabytes" + end)) for end in (".las", ".laz"))

@@ -98,6 +98,29 @@ class Ply(PointTest):
         self.assertEqual(made.extras, "curvature")
         self.assertEqual(made.notes, ["the file is a mesh; its 9 faces are ignored"])
 
+    def test_vertices_behind_faces(self):
+        """Lists of several lengths and types come before the vertices."""
+        lists = [[0, 1, 2], [], [3, 4, 5, 6] * 60, [1]] * 500
+        for form in FORMS:
+            for kind in "uchar", "int", "ushort":
+                order = ">" if "big" in form else "<"
+                if form == "ascii":
+                    end = "\r\n" if kind == "int" else "\n"
+                    faces = "".join(f"{len(v)} {' '.join(map(str, v))} 0.5{end}" for v in lists).encode()
+                else:
+                    faces = b"".join(np.array(len(v), order + NUMPY[kind]).tobytes() +
+                                     np.array(v, order + "i4").tobytes() +
+                                     np.array(0.5, order + "f4").tobytes() for v in lists)
+                head, body = ply(xyz(), form).split(b"end_header\n")
+                head = head.replace(b"element vertex", b"element face 2000\nproperty list " + kind.encode() +
+                                    b" int vertex_indices\nproperty float quality\nelement vertex")
+                data = head + b"end_header\n" + faces + body
+                self.same(self.read("a.ply", data).position, POSITIONS)
+                self.same(self.read("a.ply.gz", gzip.compress(data)).position, POSITIONS)
+                self.refused("a.ply", data[:len(head) + 2000], "ends before its vertices")
+        for text, says in ((b"list float int", "length of a list: float"), (b"list uchar quad", "type of a property")):
+            self.refused("a.ply", data.replace(b"list " + kind.encode() + b" int", text), says)
+
     def test_the_range_grid_of_a_stanford_scan(self):
         grid = "".join("0 \n" if i % 2 else f"1 {i // 2} \n" for i in range(6000)).encode()
         for size, scans in ("obj_info num_cols 100\nobj_info num_rows 60", [[0, 0, 0, 0, 100, 60]]), \
@@ -128,7 +151,8 @@ class Ply(PointTest):
                            (ply(xyz()[:2]), "lacks the property z"),
                            (ply(xyz(values=np.full((5, 3), np.nan))), "no point with a finite"),
                            (ply(xyz(), "ascii")[:-300], "truncated"),
-                           (good.replace(b"double y", b"quad y"), "unknown type")):
+                           (good.replace(b"double y", b"quad y"), "unknown type"),
+                           (good.replace(b"double y", b"list uchar double y"), "vertex holds a list")):
             self.refused("a.ply", data, says)
 
 
