@@ -33,7 +33,7 @@ typedef struct near_tile {
     uint64_t tile;
 } near_tile;
 
-/* The tiles near a tile: all whose bounds are at most a distance away. */
+/* Lists the tiles whose bounds are at most a distance away from the bounds of a tile. */
 typedef struct near_tiles {
     bool known;
     uint64_t of;
