@@ -16,11 +16,11 @@
 set -eu
 . "$(dirname "$0")/progress.sh"
 
-small_libraries="libpng-dev liburing-dev libcjson-dev libexpat1-dev libxxhash-dev libnifti-dev zlib1g-dev libbz2-dev libzstd-dev libminizip-dev libwebp-dev libnanoflann-dev"
-libraries="$small_libraries libopenvdb-dev libboost-iostreams-dev libopenimageio-dev libtiff-dev libgdcm-dev libepoxy-dev
+small_libraries="libpng-dev liburing-dev libcjson-dev libexpat1-dev libxxhash-dev libnifti-dev zlib1g-dev libbz2-dev libzstd-dev libminizip-dev libwebp-dev"
+libraries="$small_libraries libnanoflann-dev libopenvdb-dev libboost-iostreams-dev libopenimageio-dev libtiff-dev libgdcm-dev libepoxy-dev
  libegl-dev libglfw3-dev libimgui-dev libmicrohttpd-dev libjpeg62-turbo-dev libseccomp-dev libnetcdf-dev"
-small="cmake ninja-build gcc g++ libc6-dev pkg-config $small_libraries"
-build="$small libgl1-mesa-dri libegl1 libgbm1 $libraries"
+small="cmake ninja-build gcc libc6-dev pkg-config $small_libraries"
+build="$small g++ libgl1-mesa-dri libegl1 libgbm1 $libraries"
 tests="libcmocka-dev python3 python3-numpy python3-pil python3-xxhash python3-openvdb clang-14 libclang-rt-14-dev clang-format-14
  valgrind xauth xvfb libxtst6 chromium ffmpeg locales mesa-vulkan-drivers"
 compare="libopenvdb-tools python3-numpy python3-openvdb python3-pil python3-vtk9 xauth xvfb"

@@ -449,6 +449,10 @@ static int run(bricker *b, trip_brick_gaussians_result *result)
         status = spool_all(b);
     if (status == 0)
         status = look_at_sample(b);
+    if (status == 0 && b->lacking && !trip_neighbour_trees_exist())
+        status = trip_fail(TRIP_ERROR, "brick", b->p->file_name,
+                           "lacks radii or normals, and this program was built without nanoflann, "
+                           "which finds neighbours");
     if (status == 0 && b->lacking) {
         status = prepare_tiles(b);
         trip_output_close(&b->spool);

@@ -69,6 +69,11 @@ struct trip_neighbour_tree {
     }
 };
 
+bool trip_neighbour_trees_exist()
+{
+    return true;
+}
+
 trip_neighbour_tree *trip_neighbour_tree_make(const double (*positions)[3], size_t count)
 {
     try {

@@ -71,6 +71,9 @@ static inline void trip_neighbours_add(trip_neighbours *n, double distance2,
 
 typedef struct trip_neighbour_tree trip_neighbour_tree;
 
+/* Whether this program has trees. The small one does not. */
+bool trip_neighbour_trees_exist(void);
+
 /* Makes a tree of positions, which must outlive it. Returns NULL without memory. */
 trip_neighbour_tree *trip_neighbour_tree_make(const double (*positions)[3], size_t count);
 void trip_neighbour_tree_free(trip_neighbour_tree *t); /* NULL is allowed */
