@@ -334,8 +334,11 @@ static int begin_layers_and_streams(trip_gaussian_frame *f)
                                             "smaller picture");
     if (!status)
         status = begin_layers(f);
-    if (!status)
-        status = open_streams(f, f->layers);
+    for (unsigned i = f->layer_count; i-- > 0 && !status;) {
+        close_streams(f); /* they showed that their window fits */
+        f->stats = (trip_gaussian_frame_stats){ 0 };
+        status = open_streams(f, &f->layers[i]);
+    }
     f->stats.layers = f->layer_count;
     return status;
 }
