@@ -58,7 +58,8 @@ int cached_volume_check_options(const char *input)
                : trip_fail(
                      TRIP_USAGE, "usage", input,
                      "is a data set; --grid, --level-set, --spacing, --coordinates, --axes, "
-                     "--series, --time, --channel, --allow-gaps and --fill apply to volumes only");
+                     "--series, --time, --channel, --allow-gaps, --fill, --color, --k and --radius "
+                     "apply to files only");
 }
 
 /* Shows on a terminal that another process is bricking the same volume. */
@@ -300,8 +301,10 @@ static int open_volume(search *s, bool making)
 {
     cached_volume *v = s->v;
     *v = (cached_volume){ .hold = -1 };
-    int status =
-        triptych_is_gaussians(s->t, s->volume) ? library_check_scene_options(&s->options) : 0;
+    const int kind = triptych_is_gaussians(s->t, s->volume);
+    int status = kind == 3 ? library_check_cloud_options(&s->options)
+                 : kind    ? library_check_scene_options(&s->options)
+                           : 0;
     if (status == 0)
         status = cache_folder_open(&v->folder, true);
     if (status == 0)

@@ -481,9 +481,10 @@ static int brick(triptych *t, const options *o)
 /* ---- Gaussian scenes ---- */
 
 /* Refuses options that bricking a scene would ignore. */
-static int check_scene_options(const options *o)
+static int check_scene_options(const options *o, bool cloud)
 {
-    static const char *const used[] = { "force", "harmonics", "json", "output", "memory" };
+    const char *const used[] = { "force", "json", "output", "memory",
+                                 cloud ? "threads" : "harmonics" };
     for (size_t i = 0; i < brick_table.count; i++) {
         bool is_used = !trip_option_is_set(&rows[i], o);
         for (size_t n = 0; n < sizeof used / sizeof *used; n++)
@@ -491,7 +492,7 @@ static int check_scene_options(const options *o)
         if (!is_used)
             return library_fail_scene_option(rows[i].name);
     }
-    return library_check_scene_options(&o->brick);
+    return cloud ? library_check_cloud_options(&o->brick) : library_check_scene_options(&o->brick);
 }
 
 static int print_scene(const options *o, const triptych_gaussians *g, uint64_t bytes,
@@ -531,11 +532,11 @@ static int print_scene(const options *o, const triptych_gaussians *g, uint64_t b
     return 0;
 }
 
-static int brick_scene(triptych *t, const options *o)
+static int brick_scene(triptych *t, const options *o, bool cloud)
 {
     triptych_gaussians made;
     triptych_scene scene;
-    int status = check_scene_options(o);
+    int status = check_scene_options(o, cloud);
     const double begun = trip_now_seconds();
     if (!status)
         status = triptych_brick_gaussians(t, o->volume, o->output, &o->brick, &made);
@@ -561,7 +562,7 @@ static int run(options *o)
     if (!status && !scene && triptych_is_scene_file(o->volume))
         status = library_fail_scene(o->volume);
     if (!status)
-        status = scene ? brick_scene(t, o) : o->dry_run ? dry_run(t, o) : brick(t, o);
+        status = scene ? brick_scene(t, o, scene == 3) : o->dry_run ? dry_run(t, o) : brick(t, o);
     trip_progress_end(&progress);
     triptych_destroy(t);
     return status;
@@ -571,14 +572,15 @@ int trip_command_brick(int argc, char **argv)
 {
     options o = { 0 };
     option_set sets[] = { { .table = &volume_options_table, .base = &o.brick },
+                          { .table = &point_options_table, .base = &o.brick },
                           { .table = &brick_table, .base = &o } };
     const command_line c = {
         .args_doc = "INPUT",
-        .doc =
-            "Converts a volume or a Gaussian scene into a data set that is drawn from disk: three "
-            "lists of its visible voxels or Gaussians, sorted along X, Y and Z.",
+        .doc = "Converts a volume, a Gaussian scene or a cloud of points into a data set that is "
+               "drawn from disk: three "
+               "lists of its visible voxels or Gaussians, sorted along X, Y and Z.",
         .sets = sets,
-        .set_count = 2,
+        .set_count = 3,
         .argument = add_input,
         .end = check_options,
         .user = &o,

@@ -95,6 +95,7 @@ static int print_scene_json(const triptych_scene *s, const cJSON *notes, const c
     cJSON_AddBoolToObject(root, "antialiased", s->antialiased);
     cJSON_AddBoolToObject(root, "flat", s->flat);
     cJSON_AddBoolToObject(root, "y_down", s->y_down);
+    cJSON_AddBoolToObject(root, "z_up", s->z_up);
     add_box(root, "bounds", s->lo, s->hi);
     add_box(root, "typical_bounds", s->typical_lo, s->typical_hi);
     cJSON_AddNumberToObject(root, "bytes", (double)s->bytes);
@@ -137,7 +138,7 @@ static void print_scene_text(const triptych_scene *s, const cJSON *notes, const 
     printf("%-12s spherical harmonics of degree %d\n", "colour", s->degree);
     print_box("centres", s->lo, s->hi);
     print_box("typical", s->typical_lo, s->typical_hi);
-    printf("%-12s %s\n", "up", s->y_down ? "-y" : "y");
+    printf("%-12s %s\n", "up", s->z_up ? "z" : s->y_down ? "-y" : "y");
     if (s->antialiased)
         printf("%-12s opacity is compensated for the blur of a pixel\n", "antialiased");
     printf("%-12s %s in three lists of %llu bricks\n", "size", trip_format_bytes(s->bytes, bytes),

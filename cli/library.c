@@ -69,6 +69,19 @@ int library_fail_objects_option(const char *name)
     return trip_option_fail(option, "does not apply to several objects in one picture");
 }
 
+int library_check_cloud_options(const triptych_brick_options *options)
+{
+    if (options->spacing[0] != 0)
+        return trip_option_fail("--spacing", "does not apply to clouds of points");
+    for (size_t i = 0; i < volume_options_table.count; i++)
+        if (i != VOLUME_AXES && trip_option_is_set(&volume_options_table.rows[i], options)) {
+            char option[64];
+            snprintf(option, sizeof option, "--%s", volume_options_table.rows[i].name);
+            return trip_option_fail(option, "does not apply to clouds of points");
+        }
+    return 0;
+}
+
 int library_check_scene_options(const triptych_brick_options *options)
 {
     if (options->spacing[0] != 0) /* the table looks at a part of a number */
@@ -77,6 +90,13 @@ int library_check_scene_options(const triptych_brick_options *options)
         if (trip_option_is_set(&volume_options_table.rows[i], options))
             return library_fail_scene_option(volume_options_table.rows[i].name);
     return 0;
+}
+
+int library_check_file_options(const triptych_brick_options *options, int kind)
+{
+    return kind == 3 ? library_check_cloud_options(options)
+           : kind    ? library_check_scene_options(options)
+                     : 0;
 }
 
 bool library_is_scene(triptych *t, const char *input)
@@ -94,8 +114,12 @@ int library_check_kind(triptych *t, const char *input, const draw_settings *sett
                        const triptych_resources *resources,
                        const triptych_transfer_function *function)
 {
-    const bool is_scene = triptych_is_gaussians(t, input) != 0;
-    int status = draw_settings_check_kind(settings, resources, is_scene);
+    const int is_scene = triptych_is_gaussians(t, input);
+    /* The library checks a data set of a scene. It may hold a cloud. */
+    const draw_kind kind = !is_scene       ? DRAW_KIND_VOLUME
+                           : is_scene == 1 ? DRAW_KIND_SCENE
+                                           : DRAW_KIND_CLOUD;
+    int status = draw_settings_check_kind(settings, resources, kind);
     if (!status && is_scene && (function->name || function->window > 0))
         status = library_fail_scene_option(function->name ? "tf" : "window");
     return status;

@@ -28,6 +28,11 @@ int library_fail_scene_option(const char *name);
 int library_fail_objects_option(const char *name);
 /* Fails if options for reading a volume were given for a Gaussian scene. */
 int library_check_scene_options(const triptych_brick_options *options);
+/* Fails if options that a cloud of points does not have were given for one. */
+int library_check_cloud_options(const triptych_brick_options *options);
+/* Fails if options for reading were given that do not apply to a file, by the result of
+ * triptych_is_gaussians(). */
+int library_check_file_options(const triptych_brick_options *options, int kind);
 /* Whether an input is a Gaussian scene, or a scene file. */
 bool library_is_scene(triptych *t, const char *input);
 /* Fails: a command that needs volumes got such an input. */

@@ -124,21 +124,22 @@ int placed_input_check(const placed_input *p, triptych *t, const draw_settings *
                        const triptych_resources *resources,
                        const triptych_transfer_function *function)
 {
-    unsigned scenes = 0;
+    unsigned scenes = 0, captured = 0; /* the library checks data sets, which may hold clouds */
     for (unsigned i = 0; i < p->count; i++) {
-        const bool is_scene = triptych_is_gaussians(t, p->given[i].path) != 0;
+        const int is_scene = triptych_is_gaussians(t, p->given[i].path);
         if (is_scene && p->given[i].function)
             return fail_function(p->given[i].path);
-        scenes += is_scene;
+        scenes += is_scene != 0;
+        captured += is_scene == 1;
     }
     const bool moved = is_moved(p);
-    const draw_kind kind = scenes == p->count            ? DRAW_SCENES
-                           : moved || p->given->function ? DRAW_OBJECTS
-                                                         : DRAW_A_VOLUME;
+    const draw_kind kind = scenes == p->count ? (captured ? DRAW_KIND_SCENE : DRAW_KIND_CLOUD)
+                           : moved || p->given->function ? DRAW_KIND_OBJECTS
+                                                         : DRAW_KIND_VOLUME;
     int status = draw_settings_check_kind(settings, resources, kind);
     if (!status && settings->scene.order == TRIPTYCH_ORDER_SHEETS && moved)
         status = trip_option_fail("--order", "sheets draws one scene alone, where it lies");
-    if (!status && kind == DRAW_SCENES && (function->name || function->window > 0))
+    if (!status && scenes == p->count && (function->name || function->window > 0))
         status = library_fail_scene_option(function->name ? "tf" : "window");
     return status;
 }

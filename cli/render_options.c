@@ -57,7 +57,7 @@ static const trip_option rows[] = {
 static const trip_option_table render_table = { rows, sizeof rows / sizeof *rows };
 
 /* The tables of `render`. */
-enum { OWN, VIEW, LOOK, SETTINGS, HEAT, QUALITY, RESOURCES, VOLUME, SETS };
+enum { OWN, VIEW, LOOK, SETTINGS, HEAT, QUALITY, RESOURCES, VOLUME, POINTS, SETS };
 
 typedef struct parse {
     render_options *o;
@@ -132,7 +132,8 @@ static int check_input(const parse *p)
     if (!o->output)
         return trip_option_fail("-o",
                                 "no picture given; use `triptych render VOLUME -o PICTURE.png`");
-    int status = p->sets[VOLUME].given ? cached_volume_check_options(o->input) : 0;
+    int status =
+        p->sets[VOLUME].given || p->sets[POINTS].given ? cached_volume_check_options(o->input) : 0;
     return status ? status : check_more(o);
 }
 
@@ -226,6 +227,7 @@ int render_options_parse(render_options *o, int argc, char **argv)
                     [QUALITY] = { .table = &quality_table, .base = &o->quality },
                     [RESOURCES] = { .table = &resource_table, .base = &o->resources },
                     [VOLUME] = { .table = &volume_options_table, .base = &o->volume },
+                    [POINTS] = { .table = &point_options_table, .base = &o->volume },
                 } };
     const command_line c = {
         .args_doc = "VOLUME|NAME.trip [NAME.trip...]",

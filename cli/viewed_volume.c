@@ -104,12 +104,12 @@ int viewed_volume_check(const viewed_volume *s, triptych *t, const char *input,
     if (triptych_is_scene_file(input))
         return check_objects(s, t, input, resources);
     const triptych_transfer_function function = { .name = s->function };
-    const bool is_scene = triptych_is_gaussians(t, input) != 0;
+    const int is_scene = triptych_is_gaussians(t, input);
     int status = library_check_kind(t, input, s->settings, resources, &function);
     if (!status && is_scene && s->measured)
         status = library_fail_scene_option("error");
     if (!status && is_scene && cached_volume_wanted(input))
-        status = library_check_scene_options(&s->options);
+        status = library_check_file_options(&s->options, is_scene);
     if (status)
         return status;
     if (cached_volume_wanted(input))

@@ -27,4 +27,13 @@ static inline int trip_sh_count(int degree)
     return (degree + 1) * (degree + 1);
 }
 
+/* The harmonic of degree 0: 1 / (2 sqrt(pi)). */
+#define TRIP_SH_CONSTANT 0.28209479177387814
+
+/* Returns the coefficient of degree 0 of a colour from 0 to 1. */
+static inline float trip_sh_of_colour(double colour)
+{
+    return (float)((colour - 0.5) / TRIP_SH_CONSTANT);
+}
+
 #endif

@@ -40,6 +40,7 @@ enum {
     DRAW_GROUP_RENDERER,
     DRAW_GROUP_RESULTS,
     DRAW_GROUP_VOLUME,
+    DRAW_GROUP_POINTS,
     DRAW_GROUP_RAW,
     DRAW_GROUP_KEPT,
     DRAW_GROUP_OUTPUT,
@@ -127,21 +128,21 @@ int draw_settings_check_ranges(const draw_settings *s);
 /* Checks every range and rule, as triptych_check_settings() does. With `idle_too`, also refuses
  * settings that only have no effect. */
 int draw_settings_check(const draw_settings *s, triptych_renderer *renderer, bool idle_too);
-/* Kind of the data in a picture. DRAW_A_VOLUME is 0. */
+/* The kinds of data. C++ takes a kind as an int. DRAW_KIND_VOLUME is 0. */
 typedef enum draw_kind {
-    DRAW_A_VOLUME,
-    DRAW_SCENES, /* Gaussian scenes alone */
-    DRAW_OBJECTS /* volumes with places, alone or beside Gaussian scenes */
+    DRAW_KIND_VOLUME,
+    DRAW_KIND_SCENE,
+    DRAW_KIND_CLOUD,
+    DRAW_KIND_OBJECTS /* volumes with places, alone or beside Gaussian scenes */
 } draw_kind;
-
-/* Checks that all settings and resources apply to the kind of a picture. */
+/* Checks that all settings and resources apply to a kind of data. */
 int draw_settings_check_kind(const draw_settings *s, const triptych_resources *r, draw_kind kind);
 /* Returns whether a row applies, with the other settings as they are. */
-bool draw_settings_applies(const draw_settings *s, int row, draw_kind kind);
+bool draw_settings_applies(const draw_settings *s, int row, int kind);
 /* Returns whether a choice of a row that applies does too. */
-bool draw_settings_choice_applies(int row, int choice, draw_kind kind);
+bool draw_settings_choice_applies(int row, int choice, int kind);
 /* Unsets all settings that draw_settings_check_kind() would refuse. */
-void draw_settings_drop_kind(draw_settings *s, draw_kind kind);
+void draw_settings_drop_kind(draw_settings *s, int kind);
 /* Unsets all settings that the other settings or the renderer exclude. */
 void draw_settings_drop_excluded(draw_settings *s, triptych_renderer renderer);
 /* Returns the name of a given setting that only splats have, or NULL. */

@@ -361,7 +361,7 @@ static int prepare(triptych *t)
     if (!status)
         status = draw_settings_check(&t->given, &renderer, false);
     if (!status)
-        status = draw_settings_check_kind(&t->given, r, false);
+        status = draw_settings_check_kind(&t->given, r, DRAW_KIND_VOLUME);
     if (status)
         return status;
     if (t->renderer && t->required != renderer)

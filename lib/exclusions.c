@@ -327,6 +327,8 @@ static const uint64_t of_both =
     ROW(BACKGROUND) | ROW(CLIP_BOX) | ROW(CLIP_PLANE) | ROW(EARLY_TERMINATION) | ROW(FOOTPRINT) |
     ROW(SAMPLES) | ROW(DEPTH) | ROW(NORMALISE) | ROW(METHOD) | ROW(H) | ROW(LOD) | ROW(TOLERANCE);
 
+static const uint64_t of_clouds = ROW(LIGHT) | ROW(NO_SHADING);
+
 static const uint64_t not_of_objects = ROW(SHEET) | ROW(LOD) | ROW(MAX_BYTES) | ROW(MAX_MS) |
                                        ROW(SHOW) | ROW(COUNT) | ROW(TEMPERATURE);
 
@@ -334,16 +336,16 @@ static const uint64_t not_of_objects = ROW(SHEET) | ROW(LOD) | ROW(MAX_BYTES) | 
 
 /* These kinds do not have these choices, for these reasons. */
 static const struct choice {
-    draw_kind kind;
+    draw_kind kind;  /* scenes stand for clouds too */
     int row, choice; /* index in trip_option.choices */
     const char *why;
 } missing[] = {
-    { DRAW_SCENES, DRAW_FOOTPRINT, TRIPTYCH_FOOTPRINT_FIXED - 1,
+    { DRAW_KIND_SCENE, DRAW_FOOTPRINT, TRIPTYCH_FOOTPRINT_FIXED - 1,
       "fixed does not apply to Gaussian scenes" },
-    { DRAW_SCENES, DRAW_METHOD, TRIPTYCH_METHOD_IMAGE - 1,
+    { DRAW_KIND_SCENE, DRAW_METHOD, TRIPTYCH_METHOD_IMAGE - 1,
       "image does not apply to Gaussian scenes" },
-    { DRAW_OBJECTS, DRAW_ORDER, TRIPTYCH_ORDER_LISTS - 1, "lists " NOT_OF_OBJECTS },
-    { DRAW_OBJECTS, DRAW_ORDER, TRIPTYCH_ORDER_SHEETS - 1, "sheets " NOT_OF_OBJECTS },
+    { DRAW_KIND_OBJECTS, DRAW_ORDER, TRIPTYCH_ORDER_LISTS - 1, "lists " NOT_OF_OBJECTS },
+    { DRAW_KIND_OBJECTS, DRAW_ORDER, TRIPTYCH_ORDER_SHEETS - 1, "sheets " NOT_OF_OBJECTS },
 };
 
 /* The order by depth has one layer, so nothing is merged. */
@@ -352,35 +354,39 @@ static bool has_one_layer(const draw_settings *s)
     return s->scene.order <= TRIPTYCH_ORDER_DEPTH;
 }
 
-static uint64_t rows_of_kind(const draw_settings *s, draw_kind kind)
+static uint64_t rows_of_kind(const draw_settings *s, int kind)
 {
     const uint64_t merging = ROW(METHOD) | ROW(H);
-    if (kind == DRAW_A_VOLUME)
-        return ~of_scenes;
-    if (kind == DRAW_OBJECTS) /* the finest level can be asked for */
+    const uint64_t own = of_scenes | of_both | (kind == DRAW_KIND_CLOUD ? of_clouds : 0);
+    if (kind == DRAW_KIND_OBJECTS) /* the finest level can be asked for */
         return ~not_of_objects | (s->lod.voxel_px == TRIPTYCH_ZERO ? ROW(LOD) : 0);
-    return (of_scenes | of_both) & (has_one_layer(s) ? ~merging : ~0ULL);
+    return kind ? own & (has_one_layer(s) ? ~merging : ~0ULL) : ~of_scenes;
 }
 
-bool draw_settings_applies(const draw_settings *s, int row, draw_kind kind)
+bool draw_settings_applies(const draw_settings *s, int row, int kind)
 {
     return rows_of_kind(s, kind) >> row & 1;
 }
 
-bool draw_settings_choice_applies(int row, int choice, draw_kind kind)
+static bool concerns(const struct choice *c, int kind)
+{
+    return (int)c->kind == (kind == DRAW_KIND_CLOUD ? DRAW_KIND_SCENE : kind);
+}
+
+bool draw_settings_choice_applies(int row, int choice, int kind)
 {
     for (size_t i = 0; i < sizeof missing / sizeof *missing; i++)
-        if (missing[i].kind == kind && missing[i].row == row && missing[i].choice == choice)
+        if (concerns(&missing[i], kind) && missing[i].row == row && missing[i].choice == choice)
             return false;
     return true;
 }
 
 /* Returns the first choice of the settings that the kind does not have, or NULL. */
-static const struct choice *find_missing(const draw_settings *s, draw_kind kind)
+static const struct choice *find_missing(const draw_settings *s, int kind)
 {
     for (size_t i = 0; i < sizeof missing / sizeof *missing; i++) {
         const trip_option *row = &draw_settings_table.rows[missing[i].row];
-        if (missing[i].kind == kind &&
+        if (concerns(&missing[i], kind) &&
             *(const int *)((const char *)s + row->at) - row->first == missing[i].choice)
             return &missing[i];
     }
@@ -400,11 +406,15 @@ static int check_resources_of_scenes(const triptych_resources *r)
 int draw_settings_check_kind(const draw_settings *s, const triptych_resources *r, draw_kind kind)
 {
     const struct rule of_kinds[] = {
-        [DRAW_A_VOLUME] = { .given = of_scenes, .why = "applies to Gaussian scenes only" },
-        [DRAW_SCENES] = { .given = ~(of_scenes | of_both),
-                          .why = "does not apply to Gaussian scenes" },
-        [DRAW_OBJECTS] = { .given = ~rows_of_kind(s, DRAW_OBJECTS), .why = NOT_OF_OBJECTS },
+        [DRAW_KIND_VOLUME] = { .given = of_scenes, .why = "applies to Gaussian scenes only" },
+        [DRAW_KIND_SCENE] = { .given = ~(of_scenes | of_both),
+                              .why = "does not apply to Gaussian scenes" },
+        [DRAW_KIND_CLOUD] = { .given = ~(of_scenes | of_both | of_clouds),
+                              .why = "does not apply to clouds of points" },
+        [DRAW_KIND_OBJECTS] = { .given = ~rows_of_kind(s, DRAW_KIND_OBJECTS),
+                                .why = NOT_OF_OBJECTS },
     };
+    const bool objects = kind == DRAW_KIND_OBJECTS;
     const uint64_t given = given_rows(s);
     const struct choice *choice = find_missing(s, kind);
     const struct rule of_layers = {
@@ -420,14 +430,14 @@ int draw_settings_check_kind(const draw_settings *s, const triptych_resources *r
     }
     if (of_layers.given & given)
         return fail_rule(&of_layers, given);
-    if (kind != DRAW_A_VOLUME && s->clip.box && s->clip.box_of_voxels)
-        return trip_option_fail("--clip-box", kind == DRAW_SCENES
-                                                  ? "voxels: does not apply to Gaussian scenes"
-                                                  : "voxels: " NOT_OF_OBJECTS);
-    return kind == DRAW_SCENES ? check_resources_of_scenes(r) : 0;
+    if (kind && s->clip.box && s->clip.box_of_voxels)
+        return trip_option_fail("--clip-box", objects
+                                                  ? "voxels: " NOT_OF_OBJECTS
+                                                  : "voxels: does not apply to Gaussian scenes");
+    return kind && !objects ? check_resources_of_scenes(r) : 0;
 }
 
-void draw_settings_drop_kind(draw_settings *s, draw_kind kind)
+void draw_settings_drop_kind(draw_settings *s, int kind)
 {
     const struct choice *choice;
     while ((choice = find_missing(s, kind)))
@@ -435,7 +445,7 @@ void draw_settings_drop_kind(draw_settings *s, draw_kind kind)
     for (int i = 0; i < DRAW_OPTIONS; i++)
         if (!draw_settings_applies(s, i, kind))
             draw_settings_unset(s, i);
-    if (kind != DRAW_A_VOLUME && s->clip.box_of_voxels)
+    if (kind && s->clip.box_of_voxels)
         draw_settings_unset(s, DRAW_CLIP_BOX);
 }
 

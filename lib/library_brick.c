@@ -13,6 +13,8 @@
 #include "gaussian_format.h"
 #include "glance.h"
 #include "library_context.h"
+#include "library_points.h"
+#include "point_file.h"
 #include "identity.h"
 #include "report.h"
 #include "source.h"
@@ -248,6 +250,8 @@ int triptych_brick(triptych *t, const char *volume, const char *data_set,
     trip_brick_summary made = { 0 };
     int status = make_params(t, volume, options, &ranges, &params);
     params.output = data_set;
+    if (!status && options)
+        status = trip_context_check_no_points(volume, options);
     if (!status)
         status = trip_brick(&params, &made);
     if (summary)
@@ -265,6 +269,8 @@ int triptych_estimate(triptych *t, const char *volume, const char *data_set,
     trip_brick_estimate e = { 0 };
     int status = make_params(t, volume, options, &ranges, &params);
     params.output = data_set;
+    if (!status && options)
+        status = trip_context_check_no_points(volume, options);
     if (!status)
         status = trip_brick_estimate_make(&params, &e);
     *out = (triptych_brick_estimate){ 0 };
@@ -281,7 +287,7 @@ static void show_bytes(void *user, uint64_t done, uint64_t total)
 }
 
 /* Raise this with every change that makes the same scene give another data set. */
-enum { GAUSSIAN_BRICKER_VERSION = 2 };
+enum { GAUSSIAN_BRICKER_VERSION = 2, POINT_BRICKER_VERSION = 1 };
 
 static int describe_scene_form(const trip_brick_params *params, char **text)
 {
@@ -291,13 +297,36 @@ static int describe_scene_form(const trip_brick_params *params, char **text)
     return trip_fail(TRIP_ERROR, "brick", params->input, "out of memory");
 }
 
+typedef enum kind_of_input { A_VOLUME, A_SCENE, A_CLOUD } kind_of_input;
+
+static kind_of_input kind_of(const char *input)
+{
+    return trip_gaussian_file_is(input) ? A_SCENE : trip_point_file_is(input) ? A_CLOUD : A_VOLUME;
+}
+
+static int describe_cloud_form(const char *input, const triptych_brick_options *o, char **text)
+{
+    char options[256];
+    const int status = trip_context_describe_points_form(input, o, options);
+    if (status < 0)
+        return status;
+    if (asprintf(text, "%s%d %d %d\n", options, POINT_BRICKER_VERSION, GAUSSIAN_BRICKER_VERSION,
+                 TRIP_GAUSSIAN_VERSION) >= 0)
+        return 0;
+    *text = NULL;
+    return trip_fail(TRIP_ERROR, "brick", input, "out of memory");
+}
+
 /* Describes the options and the version of the program, since another version may make a different
  * data set of the same volume. */
-static int describe_form(const trip_brick_params *params, char **text)
+static int describe_form(const trip_brick_params *params, const triptych_brick_options *o,
+                         char **text)
 {
     char *form = NULL;
-    int status = trip_gaussian_file_is(params->input) ? describe_scene_form(params, &form)
-                                                      : trip_brick_form_text(params, &form);
+    const kind_of_input kind = kind_of(params->input);
+    int status = kind == A_SCENE   ? describe_scene_form(params, &form)
+                 : kind == A_CLOUD ? describe_cloud_form(params->input, o, &form)
+                                   : trip_brick_form_text(params, &form);
     if (status)
         return status;
     int length = asprintf(text, "%s" TRIP_VERSION "\n", form);
@@ -311,9 +340,9 @@ static int describe_form(const trip_brick_params *params, char **text)
 static int identify_kept(const trip_brick_params *params, triptych_identity *out)
 {
     char *text = NULL;
-    const bool is_scene = trip_gaussian_file_is(params->input); /* keeps all of its Gaussians */
+    const bool is_volume = kind_of(params->input) == A_VOLUME; /* a scene keeps all it has */
     int status =
-        is_scene ? describe_scene_form(params, &text) : trip_brick_kept_text(params, &text);
+        is_volume ? trip_brick_kept_text(params, &text) : describe_scene_form(params, &text);
     if (status)
         return status;
     const trip_digest kept = trip_source_digest_text(text);
@@ -322,15 +351,18 @@ static int identify_kept(const trip_brick_params *params, triptych_identity *out
     return 0;
 }
 
-static int identify(triptych *t, const trip_brick_params *params, uint64_t max_content_bytes,
-                    triptych_identity *out)
+static int identify(triptych *t, const trip_brick_params *params, const triptych_brick_options *o,
+                    uint64_t max_content_bytes, triptych_identity *out)
 {
     trip_source source = { 0 };
     trip_digest state = { "" }, content = { "" };
     char *text = NULL;
-    int status = trip_context_find_files(&source, params->input, &params->volume);
+    int status =
+        kind_of(params->input) == A_CLOUD ? 0 : trip_context_check_no_points(params->input, o);
     if (!status)
-        status = describe_form(params, &text);
+        status = trip_context_find_files(&source, params->input, &params->volume);
+    if (!status)
+        status = describe_form(params, o, &text);
     if (!status)
         status = identify_kept(params, out);
     if (!status)
@@ -358,7 +390,8 @@ int triptych_identify(triptych *t, const char *volume, const triptych_brick_opti
     if (!status && options && options->in_memory)
         status = trip_fail(TRIP_USAGE, "brick", volume, "a volume in memory has no identity");
     if (!status)
-        status = identify(t, &params, max_content_bytes, out);
+        status = identify(t, &params, options ? options : &(triptych_brick_options){ 0 },
+                          max_content_bytes, out);
     free(ranges);
     return trip_context_leave(before, status);
 }

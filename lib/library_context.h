@@ -54,6 +54,7 @@ struct triptych {
     struct trip_gaussian_frame *scene_frame; /* the begun frame of a scene */
     trip_renderer *device_renderer;          /* composites the scene (gl); NULL: `renderer` does */
     bool scene_done;                         /* scene_frame is complete */
+    bool lit;                                /* light shades the surfels of the frame */
     double scene_opacity;                    /* factor of the optical depth; 0 means 1 */
     double begun_ms;                         /* when scene_frame was begun */
     bool open, has_function;

@@ -12,8 +12,10 @@
 #include "gaussian_file.h"
 #include "gaussian_format.h"
 #include "gaussian_set.h"
+#include "library_points.h"
 #include "json.h"
 #include "library_context.h"
+#include "point_file.h"
 #include "source.h"
 #include "report.h"
 
@@ -110,9 +112,10 @@ static int add_files(trip_source *s, const char *path)
 
 int trip_context_find_files(trip_source *s, const char *path, const trip_volume_params *params)
 {
-    if (!trip_gaussian_file_is(path))
+    const bool is_scene = trip_gaussian_file_is(path);
+    if (!is_scene && !trip_point_file_is(path))
         return trip_source_find(s, path, params);
-    *s = (trip_source){ .format = "gaussians" };
+    *s = (trip_source){ .format = is_scene ? "gaussians" : "points" };
     const int status = add_files(s, path);
     if (status)
         trip_source_free(s);
@@ -146,7 +149,7 @@ static void show_passed(void *user, uint64_t passed)
 }
 
 /* Returns the notes of the data set: JSON for free(). */
-static char *notes_of(const char *path, const triptych_gaussians *g)
+char *trip_context_scene_notes(const char *path, const triptych_gaussians *g)
 {
     const char *name = strrchr(path, '/');
     cJSON *root = cJSON_CreateObject();
@@ -165,7 +168,7 @@ static int brick(bricking *b, const char *path, const char *data_set,
                  const triptych_brick_options *options, trip_budget *budget)
 {
     const trip_gaussian_info *info = trip_gaussian_file_info(b->file);
-    char *notes = notes_of(path, &b->seen);
+    char *notes = trip_context_scene_notes(path, &b->seen);
     if (!notes)
         return trip_fail(TRIP_ERROR, "brick", path, "out of memory");
     const trip_brick_gaussians_params params = {
@@ -202,7 +205,11 @@ int triptych_brick_gaussians(triptych *t, const char *path, const char *data_set
     const triptych_brick_options *o = options ? options : &defaults;
     bricking b = { .t = t };
     trip_budget *budget = NULL;
-    int status = o->harmonics < TRIPTYCH_STORED_HARMONICS_AUTO ||
+    if (!trip_gaussian_file_is(path) && trip_point_file_is(path))
+        return trip_context_leave(before, trip_context_brick_points(t, path, data_set, o, out));
+    int status = trip_context_check_no_points(path, o);
+    if (!status)
+        status = o->harmonics < TRIPTYCH_STORED_HARMONICS_AUTO ||
                          o->harmonics > TRIPTYCH_STORED_HARMONICS_WHOLE
                      ? trip_fail(TRIP_USAGE, "brick", path, "unknown kind of stored harmonics")
                      : trip_gaussian_file_open(path, &b.file);
@@ -222,7 +229,10 @@ int triptych_brick_gaussians(triptych *t, const char *path, const char *data_set
 int triptych_is_gaussians(triptych *t, const char *path)
 {
     trip_scope *before = trip_context_enter_anew(t);
-    return trip_context_leave(before, trip_gaussian_set_is(path) ? 2 : trip_gaussian_file_is(path));
+    return trip_context_leave(before, trip_gaussian_set_is(path)    ? 2
+                                      : trip_gaussian_file_is(path) ? 1
+                                      : trip_point_file_is(path)    ? 3
+                                                                    : 0);
 }
 
 int triptych_describe_gaussians(triptych *t, const char *path, triptych_gaussians *out)

@@ -1,11 +1,20 @@
-/* Describes clouds of points for triptych_brick.h. */
+/* Describes and bricks clouds of points for triptych_brick.h. */
 #include "triptych_brick.h"
 
+#include <ctype.h>
+#include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
+#include "anatomy.h"
+#include "brick_points.h"
+#include "gaussian_format.h"
 #include "library_context.h"
+#include "library_points.h"
+#include "neighbours.h"
 #include "point_file.h"
+#include "report.h"
 
 _Static_assert((int)TRIPTYCH_POINT_NORMAL == (int)TRIP_POINT_NORMAL &&
                    (int)TRIPTYCH_POINT_RADIUS == (int)TRIP_POINT_RADIUS &&
@@ -76,4 +85,170 @@ int triptych_describe_points(triptych *t, const char *path, triptych_points *out
     trip_scope *before = trip_context_enter_anew(t);
     *out = (triptych_points){ 0 };
     return trip_context_leave(before, describe(path, out));
+}
+
+/* ---- bricking ---- */
+
+_Static_assert((int)TRIPTYCH_POINT_COLOUR_AUTO == (int)TRIP_POINT_BY_AUTO &&
+                   (int)TRIPTYCH_POINT_COLOUR_TIME == (int)TRIP_POINT_BY_TIME,
+               "the library's colours are those of point_colour.h");
+
+static bool has_options(const triptych_brick_options *o)
+{
+    return o->point_colour || o->point_neighbours || o->point_radius != 0 ||
+           o->point_radius_factor != 0;
+}
+
+int trip_context_check_no_points(const char *path, const triptych_brick_options *o)
+{
+    return has_options(o) ? trip_fail(TRIP_USAGE, "brick", path,
+                                      "is no cloud of points; --color, --k and --radius apply to "
+                                      "clouds of points only")
+                          : 0;
+}
+
+static const char *fault_of(const triptych_brick_options *o)
+{
+    if (o->point_colour < TRIPTYCH_POINT_COLOUR_AUTO ||
+        o->point_colour > TRIPTYCH_POINT_COLOUR_TIME)
+        return "unknown colour of points";
+    if (o->point_neighbours &&
+        (o->point_neighbours < TRIP_NEIGHBOURS_MIN || o->point_neighbours > TRIP_NEIGHBOURS_MAX))
+        return "a point has 3 to 64 neighbours";
+    if (!(o->point_radius >= 0 && o->point_radius <= 1e12 && o->point_radius_factor >= 0 &&
+          o->point_radius_factor <= 1e6))
+        return "the radius of points must be at least 0, up to 1e12, and its factor up to 1e6";
+    if (o->axes && !trip_anatomy_axes_valid(o->axes))
+        return "the axes must be three letters: one of R and L, one of A and P, one of S and I";
+    return NULL;
+}
+
+int trip_context_describe_points_form(const char *path, const triptych_brick_options *o,
+                                      char text[256])
+{
+    const char *fault = fault_of(o);
+    snprintf(text, 256, "points %d %u %a %a %s\n", (int)o->point_colour, o->point_neighbours,
+             o->point_radius, o->point_radius_factor, o->axes ? o->axes : "");
+    return fault ? trip_fail(TRIP_USAGE, "brick", path, "%s", fault) : 0;
+}
+
+/* Scans of land and buildings have z up. So do E57, PTS and PTX by convention. */
+static const char *usual_up(const trip_point_info *info)
+{
+    static const char *const z_up[] = { "LAS", "LAZ", "COPC", "E57", "PTS", "PTX", "XYZ" };
+    for (size_t i = 0; i < sizeof z_up / sizeof *z_up; i++)
+        if (!strncmp(info->format, z_up[i], strlen(z_up[i])))
+            return "z";
+    return "y";
+}
+
+/* Sets the axis that a comment of the file names. */
+static void find_stated_up(const trip_point_info *info, char up[3])
+{
+    static const char name[] = "Vertical Axis:";
+    const char *at = strcasestr(info->comments, name);
+    if (!at)
+        return;
+    at += strlen(name);
+    while (*at == ' ')
+        at++;
+    const bool minus = *at == '-';
+    const int axis = tolower((unsigned char)at[minus]);
+    if (axis >= 'x' && axis <= 'z')
+        snprintf(up, 3, "%s%c", minus ? "-" : "", axis);
+}
+
+/* Sets the axis that points up from --axes: the one with the letter S, or I with a minus. */
+static int find_up(const trip_point_info *info, const char *path, const char *axes, char up[3])
+{
+    snprintf(up, 3, "%s", usual_up(info));
+    if (!axes)
+        find_stated_up(info, up);
+    for (int a = 0; axes && axes[a]; a++)
+        if (axes[a] == 'S' || axes[a] == 'I')
+            snprintf(up, 3, "%s%c", axes[a] == 'I' ? "-" : "", 'x' + a);
+    return !strcmp(up, "y") || !strcmp(up, "-y") || !strcmp(up, "z")
+               ? 0
+               : trip_fail(TRIP_USAGE, "brick", path,
+                           "is a cloud of points; y or z must point up, or y down: give --axes");
+}
+
+static void show_rows(void *user, uint64_t passed, uint64_t all)
+{
+    triptych *t = user;
+    if (t->show)
+        trip_context_show_stage(t, "brick", passed < all ? passed : all, all);
+}
+
+static void describe_surfels(const trip_point_info *info, triptych_gaussians *out)
+{
+    snprintf(out->format, sizeof out->format, "%s", info->format);
+    snprintf(out->trainer, sizeof out->trainer, "%.255s", info->comments);
+    out->flat = 1;
+    out->left_out = info->left_out;
+    memcpy(out->lo, info->lo, sizeof out->lo);
+    memcpy(out->hi, info->hi, sizeof out->hi);
+}
+
+static int brick_file(triptych *t, trip_point_file *f, const char *path, const char *data_set,
+                      const triptych_brick_options *o, trip_budget *budget, triptych_gaussians *out)
+{
+    const trip_point_info *info = trip_point_file_info(f);
+    trip_brick_points_params params = { .path = data_set,
+                                        .replace = o->replace,
+                                        .file = f,
+                                        .file_name = path,
+                                        .neighbours = o->point_neighbours,
+                                        .radius = o->point_radius,
+                                        .radius_factor = o->point_radius_factor,
+                                        .threads = trip_context_threads(o->threads),
+                                        .progress = show_rows,
+                                        .progress_user = t };
+    trip_brick_gaussians_result made = { 0 };
+    int status = trip_point_choose_colouring(info, path, (trip_point_colouring)o->point_colour,
+                                             &params.colouring);
+    describe_surfels(info, out);
+    if (status == 0)
+        status = find_up(info, path, o->axes, out->up);
+    char *notes = status == 0 ? trip_context_scene_notes(path, out) : NULL;
+    if (status == 0 && !notes)
+        status = trip_fail(TRIP_ERROR, "brick", path, "out of memory");
+    if (status < 0)
+        return status;
+    const bool down = *out->up == '-';
+    params.up[out->up[down] - 'x'] = down ? -1 : 1;
+    params.flags = out->up[0] == 'z' ? TRIP_GAUSSIAN_Z_UP : down ? TRIP_GAUSSIAN_Y_DOWN : 0;
+    params.text = notes;
+    status = trip_brick_points(&params, budget, &made);
+    if (status == 0) {
+        trip_point_file_print_notes(f);
+        if (!o->point_colour && params.colouring != TRIP_POINT_BY_RGB)
+            trip_point_note_colouring(path, params.colouring);
+    }
+    out->count = made.records;
+    free(notes);
+    return status;
+}
+
+int trip_context_brick_points(triptych *t, const char *path, const char *data_set,
+                              const triptych_brick_options *options, triptych_gaussians *out)
+{
+    triptych_gaussians described = { 0 };
+    trip_point_file *f = NULL;
+    trip_budget *budget = NULL;
+    char form[256];
+    int status = trip_context_describe_points_form(path, options, form);
+    if (status == 0)
+        status = trip_point_file_open(path, &f);
+    if (status == 0)
+        status = trip_point_file_survey(f);
+    if (status == 0)
+        status = trip_budget_create(&budget, options->memory_bytes);
+    if (status == 0)
+        status = brick_file(t, f, path, data_set, options, budget, &described);
+    if (out)
+        *out = status ? (triptych_gaussians){ 0 } : described;
+    trip_budget_destroy(budget);
+    trip_point_file_close(f);
+    return status;
 }

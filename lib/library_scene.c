@@ -14,6 +14,7 @@
 #include "placed_stream.h"
 #include "report.h"
 #include "scene_file.h"
+#include "shade.h"
 
 static const char *name_of(const triptych_object *o)
 {
@@ -169,6 +170,7 @@ int triptych_get_scene(triptych *t, triptych_scene *out)
     if (t->scene)
         *out = (triptych_scene){ .antialiased = 1, .flat = 1, .notes = t->scene->text };
     out->y_down = t->scene && t->scene->header.flags & TRIP_GAUSSIAN_Y_DOWN;
+    out->z_up = t->scene && t->scene->header.flags & TRIP_GAUSSIAN_Z_UP;
     out->volumes = trip_context_count_mixed(t);
     out->objects = t->placed_count + out->volumes;
     out->moved = !is_alone(t);
@@ -191,6 +193,19 @@ int triptych_is_scene(const triptych *t)
 
 /* ---- views ---- */
 
+/* A cloud has no strays if its bounds exceed the typical bounds by at most this factor. The view
+ * then fits the whole cloud. */
+#define CLOUD_EXTENT 2
+
+static bool is_without_strays(const trip_file_gaussian_header *h)
+{
+    bool near = (h->flags & TRIP_GAUSSIAN_CLOUD) != 0;
+    for (int a = 0; a < 3; a++)
+        near &= h->centre_hi[a] - h->centre_lo[a] <=
+                CLOUD_EXTENT * (h->typical_hi[a] - h->typical_lo[a]);
+    return near;
+}
+
 /* Sets the box of all scenes: of most centres, or of everything that the Gaussians reach. */
 static void add_scenes(const triptych *t, bool reach, trip_view_object *o)
 {
@@ -200,8 +215,9 @@ static void add_scenes(const triptych *t, bool reach, trip_view_object *o)
     }
     for (unsigned i = 0; i < t->placed_count; i++) {
         const trip_file_gaussian_header *of = &t->placed[i].set->header;
-        add_box(&t->placed[i].placement, reach ? of->reach_lo : of->typical_lo,
-                reach ? of->reach_hi : of->typical_hi, o->lo, o->hi);
+        const bool whole = reach || is_without_strays(of);
+        add_box(&t->placed[i].placement, whole ? of->reach_lo : of->typical_lo,
+                whole ? of->reach_hi : of->typical_hi, o->lo, o->hi);
     }
 }
 
@@ -212,6 +228,10 @@ trip_view_object trip_context_scene_object(const triptych *t)
     const bool y_down = h->flags & TRIP_GAUSSIAN_Y_DOWN;
     o.up = y_down ? trip_v3(0, -1, 0) : trip_v3(0, 1, 0);
     o.front = y_down ? trip_v3(0, 0, -1) : trip_v3(0, 0, 1);
+    if (h->flags & TRIP_GAUSSIAN_Z_UP) {
+        o.up = trip_v3(0, 0, 1);
+        o.front = trip_v3(0, -1, 0);
+    }
     add_scenes(t, false, &o);
     if (!t->mixed && o.lo[0] >= o.hi[0] && o.lo[1] >= o.hi[1] && o.lo[2] >= o.hi[2])
         add_scenes(t, true, &o); /* the centres are one point */
@@ -267,13 +287,23 @@ static int check_sheets(const triptych *t)
                : trip_option_fail("--order", "sheets draws one scene alone, where it lies");
 }
 
+/* Clouds alone have light. */
+static draw_kind kind_of(const triptych *t)
+{
+    bool clouds = true;
+    if (t->mixed)
+        return DRAW_KIND_OBJECTS;
+    for (unsigned i = 0; i < t->placed_count; i++)
+        clouds &= (t->placed[i].set->header.flags & TRIP_GAUSSIAN_CLOUD) != 0;
+    return clouds ? DRAW_KIND_CLOUD : DRAW_KIND_SCENE;
+}
+
 static int check(const triptych *t)
 {
     triptych_renderer r = t->resources.renderer;
     if (!t->mixed && r == TRIPTYCH_RENDERER_INTEGRAL && draw_settings_check(&t->given, &r, false))
         return TRIP_USAGE;
-    const int status =
-        draw_settings_check_kind(&t->given, &t->resources, t->mixed ? DRAW_OBJECTS : DRAW_SCENES);
+    const int status = draw_settings_check_kind(&t->given, &t->resources, kind_of(t));
     return status ? status : check_sheets(t);
 }
 
@@ -315,6 +345,7 @@ static trip_gaussian_settings settings_of(const triptych *t)
         .early_termination = g->all.early_termination == TRIPTYCH_ZERO ? DBL_MIN /* never */
                                                                        : g->all.early_termination,
         .clip = trip_context_clip(t),
+        .light = t->lit ? &t->drawn_settings : NULL,
         .depth = g->all.depth || t->mixed,
     };
     for (unsigned i = 0; i < t->placed_count; i++)
@@ -324,6 +355,24 @@ static trip_gaussian_settings settings_of(const triptych *t)
     if (!t->mixed) /* it comes behind everything */
         memcpy(out.background, t->settings.background, sizeof out.background);
     return out;
+}
+
+/* Sets the light on surfels. Colours of a camera have a light of their own, and get another only if
+ * one is given. */
+static int choose_light(triptych *t)
+{
+    const triptych_light *given = &t->given.light;
+    const trip_affine identity = trip_affine_identity();
+    trip_settings *s = &t->drawn_settings;
+    bool lit = given->kind != TRIPTYCH_LIGHT_DEFAULT;
+    for (unsigned i = 0; i < t->placed_count; i++)
+        lit |= (t->placed[i].set->header.flags & TRIP_GAUSSIAN_SHADED) != 0;
+    t->lit = lit && s->shading && kind_of(t) == DRAW_KIND_CLOUD;
+    if (given->kind == TRIPTYCH_LIGHT_VIEW)
+        s->light_direction = trip_normalize(trip_camera_direction(
+            &t->camera, given->toward[0], given->toward[1], given->toward[2]));
+    s->headlight &= given->kind != TRIPTYCH_LIGHT_VIEW;
+    return t->lit ? trip_light_check(s, &identity) : 0;
 }
 
 /* Takes the picture of several rays per pixel. */
@@ -393,6 +442,11 @@ int trip_context_begin_scene(triptych *t)
     t->drawn_settings.classify = TRIP_CLASSIFY_PRE; /* h of splats */
     t->drawn_settings.samples = side;
     t->begun_ms = trip_now_ms();
+    status = choose_light(t);
+    if (status) {
+        trip_context_end_scene(t);
+        return status;
+    }
     memset(t->placed_drawn, 0, t->placed_count * sizeof *t->placed_drawn);
     const trip_gaussian_frame_params params = {
         .sets = t->placed,

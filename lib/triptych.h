@@ -217,6 +217,7 @@ typedef struct triptych_scene {
     int antialiased;            /* trained with opacities that make up for the blur of pixels */
     int flat;                   /* surfels: each has no thickness along one axis */
     int y_down;                 /* the scene's y axis points down */
+    int z_up;                   /* the scene's z axis points up */
     double lo[3], hi[3];        /* bounds of all centres */
     /* Bounds of the centres without the outer 1 % on each side; if these are a point, bounds of the
      * Gaussians. Views fit these. */

@@ -61,6 +61,17 @@ typedef enum triptych_levels_for {
     TRIPTYCH_LEVELS_FOR_BOTH, /* needs a halo */
 } triptych_levels_for;
 
+/* The source of the colours of a cloud. */
+typedef enum triptych_point_colour {
+    TRIPTYCH_POINT_COLOUR_AUTO, /* their colours, else their intensity, else their height */
+    TRIPTYCH_POINT_COLOUR_RGB,
+    TRIPTYCH_POINT_COLOUR_INTENSITY,      /* from black to white */
+    TRIPTYCH_POINT_COLOUR_HEIGHT,         /* by the colours of viridis */
+    TRIPTYCH_POINT_COLOUR_CLASSIFICATION, /* a fixed colour for each class of LAS */
+    TRIPTYCH_POINT_COLOUR_RETURN,         /* by the colours of viridis */
+    TRIPTYCH_POINT_COLOUR_TIME,           /* by the colours of viridis */
+} triptych_point_colour;
+
 typedef struct triptych_range {
     double lo, hi; /* both inclusive */
 } triptych_range;
@@ -131,6 +142,15 @@ typedef struct triptych_brick_options {
     /* If not 0 and the volume has more voxels, reads only every second, third, ... voxel along each
      * axis, so that at most this many are read. */
     uint64_t max_voxels;
+
+    /* ---- clouds of points alone ---- */
+
+    triptych_point_colour point_colour;
+    /* Neighbours that tell the radius and the normal of a point: 3 to 64; default: 12. */
+    unsigned point_neighbours;
+    /* Radius of all points, in units of the cloud. Default: from the file or from neighbours. */
+    double point_radius;
+    double point_radius_factor; /* multiplies all radii; default: 1 */
 
     /* ---- the opacity envelope: the union of the following; `automatic` if none is given ---- */
 
@@ -296,7 +316,7 @@ TRIPTYCH_API int triptych_describe(triptych *t, const char *volume,
 
 /* A Gaussian scene: splats with shapes of their own. */
 typedef struct triptych_gaussians {
-    char format[32];   /* "3DGS PLY", ... */
+    char format[64];   /* "3DGS PLY", ... */
     char trainer[256]; /* the program that trained or wrote it, and other comments; or "" */
     char up[3];        /* the axis that points up: "x", "y", "z", or with a minus */
     uint64_t count;    /* of Gaussians, without those that are left out */
@@ -311,13 +331,14 @@ typedef struct triptych_gaussians {
     double lo[3], hi[3]; /* of the centres */
 } triptych_gaussians;
 
-/* Returns 1 if a file is a Gaussian scene, 2 for the data set of one, otherwise 0. Reports nothing.
- */
+/* Returns 1 if a file is a Gaussian scene, 2 for the data set of one, 3 for a cloud of points,
+ * otherwise 0. Reports nothing. */
 TRIPTYCH_API int triptych_is_gaussians(triptych *t, const char *path);
-/* Reads a Gaussian scene and describes it. */
+/* Reads a Gaussian scene and describes it. Refuses clouds of points. */
 TRIPTYCH_API int triptych_describe_gaussians(triptych *t, const char *path,
                                              triptych_gaussians *out);
-/* Bricks a Gaussian scene. Only the options `replace` and `memory_bytes` apply. *out gets the
+/* Bricks a Gaussian scene, or a cloud of points as flat Gaussians. Only the options `replace` and
+ * `memory_bytes` apply, and for clouds `threads` and those for clouds alone. *out gets the
  * description of the scene; NULL is allowed. */
 TRIPTYCH_API int triptych_brick_gaussians(triptych *t, const char *path, const char *data_set,
                                           const triptych_brick_options *options,

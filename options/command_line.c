@@ -313,6 +313,7 @@ static const char *const headings[] = {
     [DRAW_GROUP_RENDERER] = "Renderer and resources:",
     [DRAW_GROUP_RESULTS] = "Results and diagnostics:",
     [DRAW_GROUP_VOLUME] = "Volume (not for a data set, which has these fixed):",
+    [DRAW_GROUP_POINTS] = "Cloud of points (not for a data set, which has these fixed):",
     [DRAW_GROUP_RAW] = "Raw data:",
     [DRAW_GROUP_KEPT] = "Kept voxels (default: those that an automatic transfer function shows):",
     [DRAW_GROUP_OUTPUT] = "Output:",

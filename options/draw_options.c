@@ -273,6 +273,28 @@ static int read_fill(const trip_option *row, const char *text, void *base)
                : trip_option_fail("--fill", "takes a number or none");
 }
 
+/* Parses "R", a length, or "Fx", a factor. */
+static int read_radius(const trip_option *row, const char *text, void *base)
+{
+    triptych_brick_options *v = base;
+    const size_t length = strlen(text);
+    const bool factor = length > 1 && text[length - 1] == 'x';
+    char number[64] = "";
+    double value = 0;
+    (void)row;
+    if (length < sizeof number)
+        memcpy(number, text, factor ? length - 1 : length);
+    if (!trip_text_to_double(number, &value) || !(value > 0) || value > (factor ? 1e6 : 1e12))
+        return trip_option_fail("--radius", "takes a length above 0, or a factor with an x behind "
+                                            "it, such as 1.5x");
+    *(factor ? &v->point_radius_factor : &v->point_radius) = value;
+    return 0;
+}
+
+static const char *const point_colours[] = { "auto",           "rgb",    "intensity", "height",
+                                             "classification", "return", "time",      NULL };
+_Static_assert(TRIPTYCH_POINT_COLOUR_AUTO == 0 && TRIPTYCH_POINT_COLOUR_TIME == 6, "point_colours");
+
 static const char *const level_sets[] = { "filled", "band", NULL };
 
 #define AT(member) .at = offsetof(triptych_brick_options, member)
@@ -313,9 +335,29 @@ static const trip_option volume_rows[] = {
       "known fill values far outside of all other values: 1e20, -9999, -32768, ...",
       .group = DRAW_GROUP_VOLUME, AT(fill), CUSTOM(read_fill) },
 };
+
+static const trip_option point_rows[] = {
+    { "color", "HOW",
+      "Colors the points by rgb (their own colors), intensity, height, "
+      "classification, return or "
+      "time",
+      "auto: rgb, else intensity, else height", .group = DRAW_GROUP_POINTS,
+      .type = TRIP_OPTION_CHOICE, AT(point_colour), .choices = point_colours },
+    { "k", "N",
+      "Sets how many neighbours tell the radius and the normal of a point "
+      "without them: 3 to 64",
+      "12", .group = DRAW_GROUP_POINTS, .type = TRIP_OPTION_INTEGER, AT(point_neighbours), .lo = 3,
+      .hi = 64 },
+    { "radius", "R|Fx",
+      "Sets the radius of all points, in units of the cloud, or multiplies "
+      "all radii by F",
+      "from the file, else from neighbours", .group = DRAW_GROUP_POINTS, AT(point_radius),
+      CUSTOM(read_radius) },
+};
 #undef AT
 
 const trip_option_table volume_options_table = { volume_rows, COUNT(volume_rows) };
+const trip_option_table point_options_table = { point_rows, COUNT(point_rows) };
 
 /* ---- heat ---- */
 

@@ -42,6 +42,7 @@ enum {
     RESOURCE_OCCLUDED,
     RESOURCE_OPTIONS
 };
+enum { VOLUME_AXES = 5 }; /* a row of volume_options_table */
 enum { LOOK_LEVEL, LOOK_OPACITY_SCALE, LOOK_TF, LOOK_WINDOW, LOOK_OPTIONS };
 
 extern const trip_option_table view_options_table; /* view_options */
@@ -50,6 +51,7 @@ extern const trip_option_table resource_table;     /* triptych_resources */
 extern const trip_option_table viewer_renderer_table;
 extern const trip_option_table look_table;           /* triptych_transfer_function */
 extern const trip_option_table volume_options_table; /* triptych_brick_options */
+extern const trip_option_table point_options_table;  /* the same, for clouds of points */
 extern const trip_option_table heat_table;           /* const char *, the data set of heat */
 
 /* Fails if --window and --level were not given together. */

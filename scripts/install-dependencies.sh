@@ -17,7 +17,7 @@ set -eu
 . "$(dirname "$0")/progress.sh"
 
 small_libraries="libpng-dev liburing-dev libcjson-dev libexpat1-dev libxxhash-dev libnifti-dev zlib1g-dev libbz2-dev libzstd-dev libminizip-dev libwebp-dev"
-libraries="$small_libraries libopenvdb-dev libboost-iostreams-dev libopenimageio-dev libtiff-dev libgdcm-dev libepoxy-dev
+libraries="$small_libraries libnanoflann-dev libopenvdb-dev libboost-iostreams-dev libopenimageio-dev libtiff-dev libgdcm-dev libepoxy-dev
  libegl-dev libglfw3-dev libimgui-dev libmicrohttpd-dev libjpeg62-turbo-dev libseccomp-dev libnetcdf-dev"
 small="cmake ninja-build gcc libc6-dev pkg-config $small_libraries"
 build="$small g++ libgl1-mesa-dri libegl1 libgbm1 $libraries"

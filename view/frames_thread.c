@@ -184,8 +184,8 @@ static draw_kind kind_of(triptych *t)
 {
     triptych_scene scene;
     if (!triptych_is_scene(t) || triptych_get_scene(t, &scene))
-        return DRAW_A_VOLUME;
-    return scene.volumes ? DRAW_OBJECTS : DRAW_SCENES;
+        return DRAW_KIND_VOLUME;
+    return scene.volumes ? DRAW_KIND_OBJECTS : DRAW_KIND_SCENE;
 }
 
 static int open_data(trip_frames *f)
@@ -218,7 +218,7 @@ static int open_data(trip_frames *f)
     if (!status)
         status = p->open ? p->open(p->user, f->t, f->source, &resources)
                          : triptych_open(f->t, f->source, &resources);
-    f->kind = status ? DRAW_A_VOLUME : kind_of(f->t);
+    f->kind = status ? DRAW_KIND_VOLUME : kind_of(f->t);
     if (!status && w->heat && !f->kind)
         status = open_heat(f);
     f->open = status == 0;
@@ -231,7 +231,7 @@ static int open_data(trip_frames *f)
  * scene file take no edited function. */
 static void drop_function_of_scene(trip_frames *f)
 {
-    if (f->kind == DRAW_SCENES) {
+    if (f->kind == DRAW_KIND_SCENE) {
         free((char *)(uintptr_t)f->now.function);
         f->now.function = NULL;
     }
@@ -275,7 +275,7 @@ static int use_function(trip_frames *f)
 /* Pictures with volumes beside other objects have no coarse levels by choice. */
 static bool draws_levels(const trip_frames *f, const draw_settings *s)
 {
-    return f->kind != DRAW_OBJECTS && draw_settings_applies(s, DRAW_LOD, f->kind);
+    return f->kind != DRAW_KIND_OBJECTS && draw_settings_applies(s, DRAW_LOD, f->kind);
 }
 
 /* Returns the wanted settings with levels at least as coarse as lod_px. Short memory keeps the
@@ -610,10 +610,10 @@ static int draw_moving(trip_frames *f, double target_ms)
     const double detail = trip_pace_scale(&f->pace, wanted_pixels(f), MOVING_SHARE * target_ms);
     const double scale = sqrt(detail);
     draw_settings settings = with_levels(f, MOVING_LOD_PX * scale / detail, MOVING_MAX * target_ms);
-    if (f->kind != DRAW_SCENES && settings.sheet.samples <= 0 &&
+    if (f->kind != DRAW_KIND_SCENE && settings.sheet.samples <= 0 &&
         draw_settings_may_use_sheets(&settings))
         settings.sheet.samples = MOVING_SAMPLES;
-    if (f->kind != DRAW_SCENES && settings.all.samples <= 0) /* scenes have one by default */
+    if (f->kind != DRAW_KIND_SCENE && settings.all.samples <= 0) /* scenes have one by default */
         settings.all.samples = 1;
     return draw(f, scale, detail, &settings, true);
 }

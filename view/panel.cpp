@@ -607,8 +607,8 @@ bool draw_level(trip_panel *p, draw_settings *s)
 bool draw_quality(trip_panel *p, trip_document *d)
 {
     draw_settings *s = &d->settings;
-    bool changed = d->kind == DRAW_A_VOLUME && draw_quality_of_volume(p, s);
-    if (d->kind != DRAW_OBJECTS && draw_settings_applies(s, DRAW_LOD, d->kind))
+    bool changed = d->kind == DRAW_KIND_VOLUME && draw_quality_of_volume(p, s);
+    if (d->kind != DRAW_KIND_OBJECTS && draw_settings_applies(s, DRAW_LOD, d->kind))
         changed |= draw_level(p, s);
     int rays = s->all.samples > 0 ? s->all.samples : 0;
     changed |=
@@ -643,7 +643,7 @@ bool draw_papers(trip_panel *p, trip_document *d)
         changed |= slide_or_default(p, "Blend start (h)", &s->all.h, 0.01, 0.99, "%.2f");
     changed |=
         slide_or_default(p, "Early termination", &s->all.early_termination, 0.001, 0.1, "%.3f");
-    if (d->kind == DRAW_A_VOLUME && draw_settings_classify(s) != TRIPTYCH_CLASSIFY_POST) {
+    if (d->kind == DRAW_KIND_VOLUME && draw_settings_classify(s) != TRIPTYCH_CLASSIFY_POST) {
         double radius = s->splat.kernel_radius > 0 ? s->splat.kernel_radius : 2;
         changed |= choose_setting(p, "Compositing", &s->splat.compositing, sums, 2, by_splat);
         if (slide(p, "Kernel radius", &radius, 1.5, 6, "%.2f voxels")) {
@@ -676,7 +676,7 @@ bool draw_clip_box(trip_panel *p, trip_document *d)
         { { "i min", "i max" }, { "j min", "j max" }, { "k min", "k max" } },
         { { "x min", "x max" }, { "y min", "y max" }, { "z min", "z max" } },
     };
-    const bool is_scene = d->kind != DRAW_A_VOLUME;
+    const bool is_scene = d->kind != DRAW_KIND_VOLUME;
     triptych_clip *c = &d->settings.clip;
     triptych_clip all = {};
     bool changed = check(p, "Clip box", &c->box);
@@ -781,7 +781,7 @@ void draw_gauges(trip_panel *p, trip_viewer *v, const trip_document *d)
     char text[160], level[64] = "";
     float times[TIMES];
     const int count = trip_frames_get_times(v->frames, TIMES, times);
-    if (d->kind != DRAW_A_VOLUME) {
+    if (d->kind != DRAW_KIND_VOLUME) {
         trip_scene_say(&d->scene, &shown, nullptr, text, sizeof text);
         ImGui::TextWrapped("%s", text);
     }
@@ -790,13 +790,13 @@ void draw_gauges(trip_panel *p, trip_viewer *v, const trip_document *d)
         return;
     }
     draw_memory(p, f);
-    if (d->kind == DRAW_A_VOLUME) // the system caches the files of a scene
+    if (d->kind == DRAW_KIND_VOLUME) // the system caches the files of a scene
         draw_cached(p, f);
     ImGui::Text(
         "%s read, %s/s; %.3g million %s", bytes_text(static_cast<double>(f.bytes_read)).c_str(),
         bytes_text(f.ms > 0 ? static_cast<double>(f.bytes_read) / f.ms * 1e3 : 0).c_str(),
-        static_cast<double>(f.splats) * 1e-6, d->kind != DRAW_A_VOLUME ? "drawn" : "splats");
-    if (d->kind != DRAW_OBJECTS && draw_settings_applies(&shown, DRAW_LOD, d->kind))
+        static_cast<double>(f.splats) * 1e-6, d->kind != DRAW_KIND_VOLUME ? "drawn" : "splats");
+    if (d->kind != DRAW_KIND_OBJECTS && draw_settings_applies(&shown, DRAW_LOD, d->kind))
         std::snprintf(level, sizeof level, ", level of detail %.1f px", s.lod_px);
     ImGui::TextWrapped("moving: %.0f ms, resolution 1/%.1f%s; full: %.0f ms", s.moving_ms,
                        s.scale > 0 ? 1 / s.scale : 1.0, level, s.whole_ms);
@@ -996,7 +996,7 @@ void draw_over(trip_panel *p, trip_viewer *v)
             draw_axes(list, v, d);
         if (v->scale_bar)
             draw_scale_bar(list, v, d, p->scale);
-        if (v->probe && d->kind == DRAW_A_VOLUME)
+        if (v->probe && d->kind == DRAW_KIND_VOLUME)
             draw_probe(list, v, d);
     }
     draw_progress(list, v, p->scale);
@@ -1016,13 +1016,13 @@ void draw_document(trip_panel *p, trip_viewer *v, trip_document *d)
         draw_view(p, v, d);
     if (!d->opened)
         return;
-    if (d->kind != DRAW_A_VOLUME && section(p, "Scene"))
+    if (d->kind != DRAW_KIND_VOLUME && section(p, "Scene"))
         v->changed |= draw_scene(p, d);
-    if (d->kind == DRAW_A_VOLUME && section(p, "Transfer function"))
+    if (d->kind == DRAW_KIND_VOLUME && section(p, "Transfer function"))
         draw_function(p, v, d);
-    if (d->kind == DRAW_A_VOLUME && section(p, "Light"))
+    if (d->kind == DRAW_KIND_VOLUME && section(p, "Light"))
         v->changed |= draw_light(p, d);
-    if (d->kind == DRAW_A_VOLUME && section(p, "Effects", d->settings.effects.which != 0))
+    if (d->kind == DRAW_KIND_VOLUME && section(p, "Effects", d->settings.effects.which != 0))
         v->changed |= draw_effects(p, d);
     if (section(p, "Quality"))
         v->changed |= draw_quality(p, d);
@@ -1031,8 +1031,8 @@ void draw_document(trip_panel *p, trip_viewer *v, trip_document *d)
     if (section(p, "Clipping", false))
         v->changed |= draw_clipping(p, d);
     if (section(p, "Show")) {
-        v->changed |= d->kind == DRAW_A_VOLUME && draw_shown(p, d);
-        draw_marks(p, v, d->kind != DRAW_A_VOLUME);
+        v->changed |= d->kind == DRAW_KIND_VOLUME && draw_shown(p, d);
+        draw_marks(p, v, d->kind != DRAW_KIND_VOLUME);
     }
     if (section(p, "Statistics"))
         draw_gauges(p, v, d);

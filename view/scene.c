@@ -27,11 +27,11 @@ static bool has_gaussians(const triptych_scene *scene)
 /* Returns whether the scene has a choice. Degrees above the scene's own add nothing. */
 static bool has_choice(int row, int choice, const triptych_scene *scene)
 {
-    if (scene->volumes && !draw_settings_choice_applies(row, choice, DRAW_OBJECTS))
+    if (scene->volumes && !draw_settings_choice_applies(row, choice, DRAW_KIND_OBJECTS))
         return false;
     if (row == DRAW_ORDER && choice == TRIPTYCH_ORDER_SHEETS - 1 && scene->moved)
         return false;
-    return has_gaussians(scene) && draw_settings_choice_applies(row, choice, DRAW_SCENES) &&
+    return has_gaussians(scene) && draw_settings_choice_applies(row, choice, DRAW_KIND_SCENE) &&
            (row != DRAW_HARMONICS || choice < scene->degree);
 }
 

@@ -22,7 +22,7 @@ typedef struct trip_document {
     bool cold;            /* heat failed to open; drawn without emission */
     bool small;           /* a preview of samples; the full volume is still to be bricked */
     bool opened;          /* the members below are known */
-    draw_kind kind;       /* DRAW_A_VOLUME is 0 */
+    draw_kind kind;       /* DRAW_KIND_VOLUME is 0 */
     triptych_info info;   /* unless it is a volume: only the bounds that views fit */
     triptych_scene scene; /* zero for a volume */
     char *source;         /* path of the data set */

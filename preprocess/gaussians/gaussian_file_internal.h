@@ -35,18 +35,9 @@ struct trip_gaussian_file {
 extern const trip_gaussian_reader trip_read_gaussian_ply, trip_read_compressed_ply, trip_read_spz,
     trip_read_splat, trip_read_ksplat, trip_read_sog, trip_read_gltf_gaussians;
 
-/* Constant term of the spherical harmonics: 1 / (2 sqrt(pi)). */
-#define TRIP_SH_CONSTANT 0.28209479177387814
-
 static inline float trip_sigmoid(double logit)
 {
     return (float)(1 / (1 + __builtin_exp(-logit)));
-}
-
-/* Returns the constant coefficient of a colour from 0 to 1. */
-static inline float trip_sh_of_colour(double colour)
-{
-    return (float)((colour - 0.5) / TRIP_SH_CONSTANT);
 }
 
 struct trip_ply_header;

@@ -111,6 +111,15 @@ static uint64_t leaf_aim(uint64_t records)
     return (records + TRIP_GAUSSIAN_BRICK_AIM - 1) / TRIP_GAUSSIAN_BRICK_AIM;
 }
 
+/* Groups of usual leaves have slabs alone. The thinner bricks are along the axis, the fewer are
+ * open at a time. */
+static uint64_t slabs_of(uint64_t bricks)
+{
+    enum { SLABS_ALONE = 16 };
+    const uint64_t cube = (uint64_t)(cbrt((double)bricks) + 0.5);
+    return bricks <= SLABS_ALONE ? bricks : cube > SLABS_ALONE ? cube : SLABS_ALONE;
+}
+
 static void build_groups(build *b, uint64_t count, const uint64_t *records)
 {
     uint64_t lo = 0;
@@ -122,10 +131,9 @@ static void build_groups(build *b, uint64_t count, const uint64_t *records)
         while (hi < count && b->points[b->keys[hi].number].group == group)
             hi++;
         if (records[group]) {
-            const uint64_t slabs = (uint64_t)(cbrt((double)leaf_aim(records[group])) + 0.5);
             b->group = group;
             b->tiles = leaf_aim(records[group]);
-            b->slabs = slabs < 1 ? 1 : slabs;
+            b->slabs = slabs_of(b->tiles);
             b->tree->roots[group] = build_slabs(b, lo, hi, 0, b->slabs);
         }
         lo = hi;

@@ -14,6 +14,7 @@
 #include "normalise.h"
 #include "renderer.h"
 #include "report.h"
+#include "surfel_light.h"
 #include "weight.h"
 
 enum { BATCH = 1024, LAYERS_MAX = 3, WAYS = 2 };
@@ -222,6 +223,7 @@ static int fill(const trip_gaussian_frame *f, source *s)
     const int status = trip_placed_stream_next(s->stream, s->batch, s->keys, BATCH, &s->count);
     for (size_t i = 0; i < s->count; i++)
         compensate(f, &s->batch[i]);
+    trip_surfel_light(f->params.settings.light, f->params.camera, s->batch, s->count);
     return status;
 }
 
@@ -332,8 +334,11 @@ static int begin_layers_and_streams(trip_gaussian_frame *f)
                                             "smaller picture");
     if (!status)
         status = begin_layers(f);
-    if (!status)
-        status = open_streams(f, f->layers);
+    for (unsigned i = f->layer_count; i-- > 0 && !status;) {
+        close_streams(f); /* they showed that their window fits */
+        f->stats = (trip_gaussian_frame_stats){ 0 };
+        status = open_streams(f, &f->layers[i]);
+    }
     f->stats.layers = f->layer_count;
     return status;
 }

@@ -9,6 +9,7 @@
 #include "gaussian_profile.h"
 #include "gaussian_ray.h"
 #include "normalise.h"
+#include "surfel_light.h"
 #include "pixels.h"
 #include "renderer.h"
 #include "weight.h"
@@ -226,6 +227,7 @@ static int read_batch(trip_gaussian_integral *g)
     const double begun = trip_now_ms();
     int status = trip_placed_stream_next(g->stream, g->batch, NULL, BATCH, &g->batch_count);
     g->stats.read_ms += trip_now_ms() - begun;
+    trip_surfel_light(g->params.settings.light, g->params.camera, g->batch, g->batch_count);
     if (!status)
         add_batch(g);
     if (status || g->batch_count)

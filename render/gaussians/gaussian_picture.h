@@ -83,11 +83,12 @@ typedef struct trip_gaussian_settings {
     int degree;       /* of spherical harmonics that are drawn: 0 to TRIP_SH_DEGREE_MAX */
     bool antialiased; /* the scene was trained with compensated opacity ("antialiased", "mip") */
     trip_gaussian_shape shape;
-    double opacity_scale;     /* factor of the optical depth at the centre; 0 means 1 */
-    double early_termination; /* 0 means TRIP_GAUSSIAN_TERMINATION */
-    trip_clip clip;           /* scene space; a Gaussian is drawn if its centre is inside */
-    double background[4];     /* r, g, b, a; not premultiplied */
-    bool depth;               /* also computes distances */
+    double opacity_scale;       /* factor of the optical depth at the centre; 0 means 1 */
+    double early_termination;   /* 0 means TRIP_GAUSSIAN_TERMINATION */
+    trip_clip clip;             /* scene space; a Gaussian is drawn if its centre is inside */
+    double background[4];       /* r, g, b, a; not premultiplied */
+    const trip_settings *light; /* on surfels (surfel_light.h); NULL: none */
+    bool depth;                 /* also computes distances */
 } trip_gaussian_settings;
 
 static inline double trip_gaussian_termination(const trip_gaussian_settings *s)

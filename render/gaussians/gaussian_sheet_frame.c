@@ -7,6 +7,7 @@
 #include "gaussian_keys.h"
 #include "gaussian_sheets.h"
 #include "normalise.h"
+#include "surfel_light.h"
 #include "renderer.h"
 #include "weight.h"
 
@@ -229,6 +230,7 @@ static int draw_batch(trip_gaussian_sheet_frame *f, size_t *got)
     const double read = trip_now_ms();
     f->stats.read_ms += read - begun;
     f->stats.gaussians += *got;
+    trip_surfel_light(f->params.settings.light, f->params.camera, f->batch, *got);
     if (!status && *got)
         status = trip_gaussian_sheets_add(f->sheets, f->batch, *got);
     f->stats.draw_ms += trip_now_ms() - read;

@@ -114,6 +114,8 @@ int trip_gaussian_check_header(const trip_file_gaussian_header *h, uint64_t file
         return FAIL_FIELD(degree, "the degree of the spherical harmonics is above 3");
     if (h->flags & ~(uint32_t)TRIP_GAUSSIAN_FLAGS)
         return FAIL_FIELD(flags, "unknown flags");
+    if (h->flags & TRIP_GAUSSIAN_Y_DOWN && h->flags & TRIP_GAUSSIAN_Z_UP)
+        return FAIL_FIELD(flags, "two axes point up");
     if (!is_box(h->centre_lo, h->centre_hi))
         return FAIL_FIELD(centre_lo, "the bounds of the centres are invalid");
     if (!is_box(h->reach_lo, h->reach_hi) ||

@@ -33,7 +33,10 @@ enum trip_gaussian_flag {
     TRIP_GAUSSIAN_FLAT = 2,        /* surfels: the third deviation is 0 everywhere */
     TRIP_GAUSSIAN_Y_DOWN = 4,      /* the scene's y axis points down */
     TRIP_GAUSSIAN_PALETTE = 8,     /* a palette holds the coefficients of degree 1 and above */
-    TRIP_GAUSSIAN_FLAGS = 15,
+    TRIP_GAUSSIAN_Z_UP = 16,       /* the scene's z axis points up; not with Y_DOWN */
+    TRIP_GAUSSIAN_CLOUD = 32,      /* surfels of a cloud of points */
+    TRIP_GAUSSIAN_SHADED = 64,     /* of a cloud: light shades its colours by default */
+    TRIP_GAUSSIAN_FLAGS = 127,
 };
 
 typedef struct trip_file_gaussian_header {

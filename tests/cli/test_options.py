@@ -16,6 +16,9 @@ SIZES = ["", "0", "-5", "x", "5Q", "5MM", "nan", "99999999999999999999999G", "M"
 
 # Wrong values of each option. None marks an option without a value.
 BRICK = {
+    "--color": NAMES + ["red", "RGB"],
+    "--k": COUNTS + ["2", "65"],
+    "--radius": ["", "0", "-1", "x", "1y", "xx", "nan", "inf", "1e13", "1e7x", "0x"],
     "--allow-gaps": None,
     "--series": COUNTS,
     "--axes": NAMES + ["PI", "PIRS", "pir", "PAR"],
@@ -53,6 +56,9 @@ BRICK = {
     "--output": [],
 }
 RENDER = {
+    "--color": NAMES + ["red", "RGB"],
+    "--k": COUNTS + ["2", "65"],
+    "--radius": ["", "0", "-1", "x", "1y", "xx", "nan", "inf", "1e13", "1e7x", "0x"],
     "--axes": NAMES + ["PI", "PIRS", "pir", "PAR"],
     "--channel": ["", "-1", "1.5", "x", "9" * 20],
     "--time": ["", "-1", "1.5", "x", "9" * 20],

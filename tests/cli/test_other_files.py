@@ -140,18 +140,20 @@ class OtherFiles(program.ProgramTest):
             os.remove(name)
 
     def test_every_command_prints_the_line(self):
-        program.write("a.ply", ply(*VERTICES))
+        program.write("a.off", b"OFF\n3 1 0\n")
         program.write("path.json", json.dumps(PATH).encode())
-        program.write("a.las", b"LASF" + bytes(300))
-        program.write("a.pcd", b"# .PCD v.7\nVERSION .7\nFIELDS x y z\n")
-        program.write("a.xyz", b"1 2 3\n4 5 6\n")
-        program.write("a.e57", b"ASTM-E57" + bytes(300))
-        for name, says in (("a.ply", "a cloud of 3 points"), ("a.las", "LAS or LAZ"),
-                           ("a.pcd", "PCD"), ("a.xyz", "scanned points"), ("a.e57", "E57"),
-                           ("path.json", "--path")):
+        for name, says in (("a.off", "a mesh (OFF)"), ("path.json", "--path")):
             for command in ("render", name, "-o", "a.png"), ("brick", name, "-o", "a.trip"), \
                            ("view", name), ("serve", name):
                 self.leaves_nothing(1, *command, says=says)
+
+    def test_damaged_clouds_are_refused_with_their_names(self):
+        for name, data in (("a.las", b"LASF" + bytes(300)), ("a.e57", b"ASTM-E57" + bytes(300)),
+                           ("a.pcd", b"# .PCD v.7\nVERSION .7\nFIELDS x y z\n"),
+                           ("a.ply", ply(*VERTICES))):
+            program.write(name, data)
+            for command in ("render", name, "-o", "a.png"), ("brick", name, "-o", "a.trip"):
+                self.leaves_nothing(1, *command, says=f"triptych: read: {name}: ")
 
     def test_info_describes_a_cloud_of_points(self):
         rows = ply(*VERTICES) + b"2 0 0.001\n636000.125 850000.5 -1\n"

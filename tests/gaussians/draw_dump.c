@@ -46,6 +46,7 @@ static trip_vec3 vector(const double *n)
 
 static void read_gaussian(trip_gaussian *g, const double *n)
 {
+    *g = (trip_gaussian){ 0 };
     for (int i = 0; i < 3; i++) {
         g->centre[i] = n[i];
         g->deviations[i] = (float)n[3 + i];

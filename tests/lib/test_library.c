@@ -269,7 +269,7 @@ static void more_memory_never_draws_less(void **state)
 {
     static float rgba[FLOATS];
     draw_settings s = { .all.samples = 4 };
-    const uint64_t step = TEST_BY_TURNS ? 3000000 : 500000;
+    const uint64_t step = TEST_BY_TURNS ? 4500000 : 500000;
     int drawn = 0, refused = 0;
     (void)state;
     for (uint64_t memory = 6 << 20; memory < 24 << 20; memory += step) {
@@ -919,7 +919,7 @@ static void a_turned_view_can_be_turned_back(void **state)
 static void the_integral_of_kept_voxels_equals_the_one_of_the_volume(void **state)
 {
     (void)state;
-    enum { SMALL = 20, SMALL_FLOATS = 4 * SMALL * SMALL };
+    enum { SMALL = TEST_BY_TURNS ? 8 : 20, SMALL_FLOATS = 4 * SMALL * SMALL };
     float stored[SMALL_FLOATS], source[SMALL_FLOATS];
     triptych *t = new_context();
     draw_settings s = { 0 };

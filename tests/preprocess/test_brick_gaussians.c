@@ -710,7 +710,7 @@ static void write_changed(const unsigned char *index, size_t bytes, size_t at, c
 static void a_false_index_with_valid_checksums_is_refused(void **state)
 {
     (void)state;
-    const uint32_t four = 4, eight = 8, sixteen = 16, none = 0, many = 7000;
+    const uint32_t four = 4, eight = 8, unknown = 1 << 10, two_up = 4 + 16, none = 0, many = 7000;
     const uint64_t huge = UINT64_C(1) << 60, wrong = 5, zero = 0;
     const double nan_double = NAN, far = 1e17, low = -1e9;
     const float nan_float = NAN, large = 1e31f, two = 2, hot = 80;
@@ -727,7 +727,8 @@ static void a_false_index_with_valid_checksums_is_refused(void **state)
         { HEADER(index_bytes), &wrong, 8, "instead of the 5 in its header" },
         { HEADER(records), &wrong, 8, "another number of records" },
         { HEADER(degree), &four, 4, "above 3" },
-        { HEADER(flags), &sixteen, 4, "unknown flags" },
+        { HEADER(flags), &unknown, 4, "unknown flags" },
+        { HEADER(flags), &two_up, 4, "two axes point up" },
         { HEADER(flags), &eight, 4, "entries of the palette" },
         { HEADER(palette_count), &wrong, 8, "entries of the palette" },
         { HEADER(palette_offset), &wrong, 8, "palette has a wrong offset" },

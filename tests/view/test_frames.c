@@ -528,7 +528,7 @@ static void a_scene_is_described_and_drawn_as_by_the_library(void **state)
     copy c = take(f);
     assert_drawn_alike(&c, path, &w);
     assert_true(trip_frames_take_opened(f, &o));
-    assert_true(o.first && o.kind == DRAW_SCENES && o.scene.gaussians == 500 && o.scene.y_down);
+    assert_true(o.first && o.kind == DRAW_KIND_SCENE && o.scene.gaussians == 500 && o.scene.y_down);
     assert_true(!o.function && o.histogram.total == 0 && o.info.lo[0] < -0.9 && o.info.hi[0] > 0.9);
     trip_opened_free(&o);
     /* Parts that a scene lacks are left out. */

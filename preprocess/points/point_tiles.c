@@ -1,0 +1,506 @@
+#include "point_tiles.h"
+
+#include <math.h>
+#include <pthread.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "folder.h"
+#include "report.h"
+
+enum { FAN = 8, LEVELS_MAX = 24, SLOTS_MAX = 4096, SORTED_BYTES = 1 << 17, TELL_EVERY = 1 << 14 };
+
+typedef struct box {
+    double lo[3], hi[3];
+} box;
+
+/* A tile in memory. */
+typedef struct slot {
+    uint64_t tile;
+    uint64_t used; /* number of the last search that used it */
+    unsigned users;
+    bool filled, loading;
+    int status;
+    uint32_t count;
+    double (*positions)[3];
+    trip_neighbour_tree *tree;
+} slot;
+
+enum { NEAR_MAX = 64 };
+
+typedef struct near_tile {
+    box box;
+    uint64_t tile;
+} near_tile;
+
+/* Lists the tiles whose bounds are at most a distance away from the bounds of a tile. */
+typedef struct near_tiles {
+    bool known;
+    uint64_t of;
+    double distance2; /* below 0: too many tiles are near */
+    unsigned count;
+    near_tile tiles[NEAR_MAX];
+} near_tiles;
+
+struct trip_point_tiles {
+    trip_point_tiles_params params;
+    trip_budget *budget;
+    trip_output rows; /* sorted */
+    trip_gaussian_tree tree;
+    trip_point_tile *tiles;
+    size_t tiles_bytes;
+    uint64_t tile_count;
+    uint64_t leaf, leaf_left; /* of the row that comes next, and its rows that are left */
+    uint64_t passed;
+    /* Boxes of FAN consecutive tiles, of FAN such boxes, and so on up to one box. */
+    box *boxes;
+    size_t boxes_bytes;
+    uint64_t level_at[LEVELS_MAX], level_count[LEVELS_MAX];
+    unsigned levels;
+    /* Searches. The lock guards the slots and slot_of. */
+    pthread_mutex_t lock;
+    pthread_cond_t loaded;
+    slot *slots;
+    unsigned slot_count, threads;
+    uint32_t *slot_of; /* 1 + the slot of a tile; 0: none */
+    uint64_t searches;
+    trip_point_row *rooms; /* for the rows of a tile, one for each thread */
+    near_tiles *near;      /* one for each thread */
+};
+
+static int fail_memory(const trip_point_tiles *t)
+{
+    return trip_fail(TRIP_ERROR, "brick", t->params.name,
+                     "the search for neighbours needs more memory than --memory allows: raise "
+                     "--memory");
+}
+
+/* ---- sorting ---- */
+
+static size_t room_of_tiles(const trip_point_tiles *t)
+{
+    return (t->tree.leaf_count + t->params.records / TRIP_POINT_TILE_MAX + 1) * sizeof *t->tiles;
+}
+
+/* A leaf with too many rows becomes several tiles with about equal numbers. */
+static void begin_tile(trip_point_tiles *t, const trip_point_row *row)
+{
+    if (t->leaf_left == 0)
+        t->leaf_left = t->tree.leaves[row->head.group].records;
+    const uint64_t pieces = (t->leaf_left + TRIP_POINT_TILE_MAX - 1) / TRIP_POINT_TILE_MAX;
+    trip_point_tile *tile = &t->tiles[t->tile_count++];
+    *tile = (trip_point_tile){ .first = t->passed,
+                               .reserved = (uint32_t)((t->leaf_left + pieces - 1) / pieces) };
+    memcpy(tile->lo, row->position, sizeof tile->lo);
+    memcpy(tile->hi, row->position, sizeof tile->hi);
+}
+
+static int add_row(void *user, const unsigned char *spilled)
+{
+    trip_point_tiles *t = user;
+    const trip_point_row *row = (const void *)spilled;
+    trip_point_tile *tile = &t->tiles[t->tile_count ? t->tile_count - 1 : 0];
+    if (t->tile_count == 0 || tile->count == tile->reserved) {
+        begin_tile(t, row);
+        tile = &t->tiles[t->tile_count - 1];
+    }
+    for (int a = 0; a < 3; a++) {
+        tile->lo[a] = fmin(tile->lo[a], row->position[a]);
+        tile->hi[a] = fmax(tile->hi[a], row->position[a]);
+    }
+    tile->count++;
+    t->leaf_left--;
+    if (++t->passed % TELL_EVERY == 0 && t->params.progress)
+        t->params.progress(t->params.user, t->passed);
+    return trip_output_append(&t->rows, row, sizeof *row);
+}
+
+static void place_row(void *user, const trip_gaussian *row, trip_spilled *head)
+{
+    trip_point_tiles *t = user;
+    head->group = trip_gaussian_tree_leaf(&t->tree, row->centre, 0);
+    head->at = row->centre[0];
+    t->tree.leaves[head->group].records++;
+}
+
+static int sort(trip_point_tiles *t)
+{
+    const trip_point_tiles_params *p = &t->params;
+    int status = trip_output_create(&t->rows,
+                                    &(trip_output_params){ .folder = p->folder,
+                                                           .name = TRIP_SPOOL_NAME,
+                                                           .buffer_bytes = SORTED_BYTES,
+                                                           .unnamed = true },
+                                    t->budget);
+    if (status < 0)
+        return status;
+    if (!trip_gaussian_tree_build(&t->tree, p->sample, 0, &p->records, 1, t->budget))
+        return fail_memory(t);
+    t->tiles_bytes = room_of_tiles(t);
+    t->tiles = trip_budget_take(t->budget, t->tiles_bytes);
+    if (!t->tiles)
+        return fail_memory(t);
+    status = trip_gaussian_sort(&(trip_gaussian_sort_params){ .spool = p->spool,
+                                                              .records = p->records,
+                                                              .place = place_row,
+                                                              .folder = p->folder,
+                                                              .path = p->name,
+                                                              .emit = add_row,
+                                                              .user = t },
+                                t->budget);
+    return status == 0 ? trip_output_flush(&t->rows) : status;
+}
+
+/* ---- boxes ---- */
+
+static void widen(box *b, const double lo[3], const double hi[3], bool first)
+{
+    for (int a = 0; a < 3; a++) {
+        b->lo[a] = first ? lo[a] : fmin(b->lo[a], lo[a]);
+        b->hi[a] = first ? hi[a] : fmax(b->hi[a], hi[a]);
+    }
+}
+
+static int make_boxes(trip_point_tiles *t)
+{
+    uint64_t all = 0;
+    for (uint64_t n = t->tile_count; t->levels == 0 || n > 1;) {
+        n = (n + FAN - 1) / FAN;
+        t->level_at[t->levels] = all;
+        t->level_count[t->levels++] = n;
+        all += n;
+    }
+    t->boxes_bytes = all * sizeof *t->boxes;
+    t->boxes = trip_budget_take(t->budget, t->boxes_bytes);
+    if (!t->boxes)
+        return fail_memory(t);
+    for (uint64_t i = 0; i < t->tile_count; i++)
+        widen(&t->boxes[i / FAN], t->tiles[i].lo, t->tiles[i].hi, i % FAN == 0);
+    for (unsigned l = 1; l < t->levels; l++)
+        for (uint64_t i = 0; i < t->level_count[l - 1]; i++) {
+            const box *below = &t->boxes[t->level_at[l - 1] + i];
+            widen(&t->boxes[t->level_at[l] + i / FAN], below->lo, below->hi, i % FAN == 0);
+        }
+    return 0;
+}
+
+int trip_point_tiles_make(trip_point_tiles **out, const trip_point_tiles_params *params,
+                          trip_budget *budget)
+{
+    trip_point_tiles *t = calloc(1, sizeof *t);
+    *out = t;
+    if (!t)
+        return trip_fail(TRIP_ERROR, "brick", params->name, "out of memory");
+    t->params = *params;
+    t->budget = budget;
+    t->rows.fd = -1;
+    pthread_mutex_init(&t->lock, NULL);
+    pthread_cond_init(&t->loaded, NULL);
+    int status = sort(t);
+    if (status == 0)
+        status = make_boxes(t);
+    trip_gaussian_tree_free(&t->tree);
+    if (status < 0) {
+        trip_point_tiles_free(t);
+        *out = NULL;
+    }
+    return status;
+}
+
+uint64_t trip_point_tiles_count(const trip_point_tiles *t)
+{
+    return t->tile_count;
+}
+
+const trip_point_tile *trip_point_tiles_at(const trip_point_tiles *t, uint64_t tile)
+{
+    return &t->tiles[tile];
+}
+
+int trip_point_tiles_read(const trip_point_tiles *t, uint64_t tile, trip_point_row *rows)
+{
+    const trip_point_tile *at = &t->tiles[tile];
+    return trip_output_read(&t->rows, at->first * sizeof *rows, rows, at->count * sizeof *rows);
+}
+
+/* ---- tiles in memory ---- */
+
+static const size_t room_bytes = TRIP_POINT_TILE_MAX * sizeof(trip_point_row);
+
+static size_t positions_bytes(void)
+{
+    return TRIP_POINT_TILE_MAX * 3 * sizeof(double);
+}
+
+static size_t slot_bytes(void)
+{
+    return positions_bytes() + trip_neighbour_tree_bytes(TRIP_POINT_TILE_MAX) + sizeof(slot);
+}
+
+static int take_slots(trip_point_tiles *t, unsigned count)
+{
+    t->slots = calloc(count, sizeof *t->slots);
+    t->slot_of = trip_budget_take(t->budget, t->tile_count * sizeof *t->slot_of);
+    t->rooms = trip_budget_take(t->budget, t->threads * room_bytes);
+    t->near = calloc(t->threads, sizeof *t->near);
+    if (!t->slots || !t->slot_of || !t->rooms || !t->near)
+        return fail_memory(t);
+    for (; t->slot_count < count; t->slot_count++) {
+        slot *s = &t->slots[t->slot_count];
+        const size_t beside = slot_bytes() - positions_bytes();
+        if (!trip_budget_charge(t->budget, beside))
+            return fail_memory(t);
+        s->positions = trip_budget_take(t->budget, positions_bytes());
+        if (!s->positions) {
+            trip_budget_discharge(t->budget, beside);
+            return fail_memory(t);
+        }
+    }
+    return 0;
+}
+
+int trip_point_tiles_begin_searches(trip_point_tiles *t, unsigned threads)
+{
+    const unsigned least = 2 * threads + 1; /* a thread uses one and loads another */
+    const uint64_t wanted = trip_budget_left_bytes(t->budget) / 2 / slot_bytes();
+    uint64_t count = t->tile_count < wanted ? t->tile_count : wanted;
+    count = count < least ? least : count > SLOTS_MAX ? SLOTS_MAX : count;
+    t->threads = threads;
+    return take_slots(t, (unsigned)count);
+}
+
+/* Returns a slot that no thread uses, the one that was used longest ago. */
+static slot *oldest(trip_point_tiles *t)
+{
+    slot *found = NULL;
+    for (unsigned i = 0; i < t->slot_count; i++) {
+        slot *s = &t->slots[i];
+        if (!s->filled && !s->loading)
+            return s;
+        if (s->users == 0 && (!found || s->used < found->used))
+            found = s;
+    }
+    return found;
+}
+
+static int load(trip_point_tiles *t, unsigned thread, slot *s)
+{
+    trip_point_row *rows = t->rooms + thread * TRIP_POINT_TILE_MAX;
+    const int status = trip_point_tiles_read(t, s->tile, rows);
+    if (status < 0)
+        return status;
+    s->count = t->tiles[s->tile].count;
+    for (uint32_t i = 0; i < s->count; i++)
+        memcpy(s->positions[i], rows[i].position, sizeof s->positions[i]);
+    s->tree = trip_neighbour_tree_make((const double(*)[3])s->positions, s->count);
+    return s->tree ? 0 : trip_fail(TRIP_ERROR, "brick", t->params.name, "out of memory");
+}
+
+/* Empties a slot for a tile. The lock is held. */
+static slot *claim(trip_point_tiles *t, uint64_t tile)
+{
+    slot *s = oldest(t);
+    if (s->filled)
+        t->slot_of[s->tile] = 0;
+    s->tile = tile;
+    s->filled = false;
+    s->loading = true;
+    t->slot_of[tile] = (uint32_t)(s - t->slots) + 1;
+    return s;
+}
+
+static void end_loading(trip_point_tiles *t, slot *s, int status)
+{
+    pthread_mutex_lock(&t->lock);
+    s->status = status;
+    s->loading = false;
+    s->filled = true;
+    pthread_cond_broadcast(&t->loaded);
+    pthread_mutex_unlock(&t->lock);
+}
+
+/* Returns the slot of a tile, which stays until let_go(). */
+static slot *hold(trip_point_tiles *t, unsigned thread, uint64_t tile)
+{
+    pthread_mutex_lock(&t->lock);
+    const bool found = t->slot_of[tile] != 0;
+    slot *s = found ? &t->slots[t->slot_of[tile] - 1] : claim(t, tile);
+    s->users++;
+    s->used = ++t->searches;
+    while (found && s->loading)
+        pthread_cond_wait(&t->loaded, &t->lock);
+    pthread_mutex_unlock(&t->lock);
+    if (!found) {
+        trip_neighbour_tree_free(s->tree);
+        s->tree = NULL;
+        end_loading(t, s, load(t, thread, s));
+    }
+    return s;
+}
+
+static void let_go(trip_point_tiles *t, slot *s)
+{
+    pthread_mutex_lock(&t->lock);
+    s->users--;
+    pthread_mutex_unlock(&t->lock);
+}
+
+static int search_tile(trip_point_tiles *t, unsigned thread, uint64_t tile, trip_neighbours *n)
+{
+    slot *s = hold(t, thread, tile);
+    const int status = s->status;
+    if (status == 0)
+        trip_neighbour_tree_search(s->tree, n);
+    let_go(t, s);
+    return status;
+}
+
+/* ---- searches ---- */
+
+static double distance2(const double lo[3], const double hi[3], const double p[3])
+{
+    double sum = 0;
+    for (int a = 0; a < 3; a++) {
+        const double below = lo[a] - p[a], above = p[a] - hi[a];
+        const double d = below > above ? below : above;
+        sum += d > 0 ? d * d : 0;
+    }
+    return sum;
+}
+
+static double apart2(const double lo[3], const double hi[3], const trip_point_tile *tile)
+{
+    double sum = 0;
+    for (int a = 0; a < 3; a++) {
+        const double below = lo[a] - tile->hi[a], above = tile->lo[a] - hi[a];
+        const double d = below > above ? below : above;
+        sum += d > 0 ? d * d : 0;
+    }
+    return sum;
+}
+
+typedef struct child {
+    uint64_t at;
+    double distance2;
+} child;
+
+/* Lists the children of a box by distance. Children of level 0 are tiles. */
+static unsigned list_children(const trip_point_tiles *t, unsigned level, uint64_t at,
+                              const double p[3], child out[FAN])
+{
+    const uint64_t end = level ? t->level_count[level - 1] : t->tile_count;
+    unsigned count = 0;
+    for (uint64_t i = at * FAN; i < (at + 1) * FAN && i < end; i++) {
+        const box *b = level ? &t->boxes[t->level_at[level - 1] + i] : NULL;
+        const double d2 =
+            b ? distance2(b->lo, b->hi, p) : distance2(t->tiles[i].lo, t->tiles[i].hi, p);
+        unsigned to = count++;
+        for (; to > 0 && out[to - 1].distance2 > d2; to--)
+            out[to] = out[to - 1];
+        out[to] = (child){ i, d2 };
+    }
+    return count;
+}
+
+/* Searches all tiles but `own` below a box. */
+static int descend(trip_point_tiles *t, unsigned thread, unsigned level, uint64_t at, uint64_t own,
+                   trip_neighbours *n)
+{
+    child children[FAN];
+    const unsigned count = list_children(t, level, at, n->position, children);
+    int status = 0;
+    for (unsigned i = 0; i < count && status == 0; i++) {
+        if (children[i].distance2 > trip_neighbours_reach2(n))
+            return 0;
+        if (level > 0)
+            status = descend(t, thread, level - 1, children[i].at, own, n);
+        else if (children[i].at != own)
+            status = search_tile(t, thread, children[i].at, n);
+    }
+    return status;
+}
+
+/* Lists the tiles below a box that are near. Returns false if there are too many. */
+static bool list_near(const trip_point_tiles *t, unsigned level, uint64_t at, near_tiles *near)
+{
+    const trip_point_tile *of = &t->tiles[near->of];
+    const uint64_t end = level ? t->level_count[level - 1] : t->tile_count;
+    for (uint64_t i = at * FAN; i < (at + 1) * FAN && i < end; i++) {
+        const box *b = level ? &t->boxes[t->level_at[level - 1] + i] : NULL;
+        const trip_point_tile *tile = level ? NULL : &t->tiles[i];
+        if (apart2(b ? b->lo : tile->lo, b ? b->hi : tile->hi, of) > near->distance2)
+            continue;
+        if (level > 0) {
+            if (!list_near(t, level - 1, i, near))
+                return false;
+        } else if (i != near->of) {
+            if (near->count == NEAR_MAX)
+                return false;
+            near_tile *to = &near->tiles[near->count++];
+            to->tile = i;
+            widen(&to->box, tile->lo, tile->hi, true);
+        }
+    }
+    return true;
+}
+
+/* Lists the tiles within a quarter of the tile's extent, or within less if there are too many. */
+static const near_tiles *find_near(const trip_point_tiles *t, unsigned thread, uint64_t tile)
+{
+    enum { TRIES = 8 };
+    near_tiles *near = &t->near[thread];
+    const trip_point_tile *of = &t->tiles[tile];
+    double extent2 = 0;
+    if (near->known && near->of == tile)
+        return near;
+    for (int a = 0; a < 3; a++)
+        extent2 += (of->hi[a] - of->lo[a]) * (of->hi[a] - of->lo[a]);
+    near->known = true;
+    near->of = tile;
+    near->distance2 = extent2 / 16;
+    for (int i = 0; i < TRIES; i++, near->distance2 /= 4) {
+        near->count = 0;
+        if (list_near(t, t->levels - 1, 0, near))
+            return near;
+    }
+    near->distance2 = -1;
+    return near;
+}
+
+int trip_point_tiles_search(trip_point_tiles *t, unsigned thread, uint64_t tile, trip_neighbours *n)
+{
+    const near_tiles *near = find_near(t, thread, tile);
+    int status = search_tile(t, thread, tile, n);
+    if (status < 0 || !(trip_neighbours_reach2(n) <= near->distance2))
+        return status < 0 ? status : descend(t, thread, t->levels - 1, 0, tile, n);
+    for (unsigned i = 0; i < near->count && status == 0; i++)
+        if (distance2(near->tiles[i].box.lo, near->tiles[i].box.hi, n->position) <=
+            trip_neighbours_reach2(n))
+            status = search_tile(t, thread, near->tiles[i].tile, n);
+    return status;
+}
+
+void trip_point_tiles_free(trip_point_tiles *t)
+{
+    if (!t)
+        return;
+    for (unsigned i = 0; i < t->slot_count; i++) {
+        trip_neighbour_tree_free(t->slots[i].tree);
+        trip_budget_release(t->budget, t->slots[i].positions, positions_bytes());
+        trip_budget_discharge(t->budget, slot_bytes() - positions_bytes());
+    }
+    free(t->slots);
+    free(t->near);
+    if (t->slot_of)
+        trip_budget_release(t->budget, t->slot_of, t->tile_count * sizeof *t->slot_of);
+    if (t->rooms)
+        trip_budget_release(t->budget, t->rooms, t->threads * room_bytes);
+    if (t->boxes)
+        trip_budget_release(t->budget, t->boxes, t->boxes_bytes);
+    if (t->tiles)
+        trip_budget_release(t->budget, t->tiles, t->tiles_bytes);
+    trip_output_close(&t->rows);
+    pthread_cond_destroy(&t->loaded);
+    pthread_mutex_destroy(&t->lock);
+    free(t);
+}

@@ -1,0 +1,67 @@
+/* A cloud on disk, sorted into tiles of neighbouring points. Threads search the tiles for nearest
+ * neighbours. Each search is exact: it goes on to other tiles as far as their bounds are near
+ * enough. Tiles depend on the points alone, not on the memory. */
+#ifndef TRIP_POINT_TILES_H
+#define TRIP_POINT_TILES_H
+
+#include <assert.h>
+
+#include "gaussian_sort.h"
+#include "gaussian_tree.h"
+#include "neighbours.h"
+
+enum { TRIP_POINT_TILE_MAX = 6144 };
+
+/* A point in a file of tiles. It begins as a trip_gaussian without extent, so that
+ * trip_gaussian_sort() can sort it. */
+typedef struct trip_point_row {
+    trip_spilled head;
+    double position[3];
+    float deviations[3]; /* 0 */
+    float scan;
+    float normal[3]; /* 0, 0, 0: none */
+    float radius;    /* 0: none */
+    float colour[3]; /* or a value, which a palette colours */
+    float reserved;
+} trip_point_row;
+
+static_assert(offsetof(trip_point_row, deviations) ==
+                  sizeof(trip_spilled) + offsetof(trip_gaussian, deviations),
+              "a row begins as a Gaussian");
+
+typedef struct trip_point_tile {
+    double lo[3], hi[3];
+    uint64_t first; /* row */
+    uint32_t count, reserved;
+} trip_point_tile;
+
+typedef struct trip_point_tiles trip_point_tiles;
+
+typedef struct trip_point_tiles_params {
+    const trip_output *spool; /* of trip_point_row, flushed */
+    uint64_t records;
+    const trip_gaussian_sample *sample; /* of the positions, all of group 0 */
+    const char *folder;                 /* for temporary files */
+    const char *name;                   /* of the cloud, for messages */
+    void (*progress)(void *user, uint64_t rows);
+    void *user;
+} trip_point_tiles_params;
+
+/* Sorts the rows. */
+int trip_point_tiles_make(trip_point_tiles **out, const trip_point_tiles_params *params,
+                          trip_budget *budget);
+void trip_point_tiles_free(trip_point_tiles *t); /* NULL is allowed */
+
+uint64_t trip_point_tiles_count(const trip_point_tiles *t);
+const trip_point_tile *trip_point_tiles_at(const trip_point_tiles *t, uint64_t tile);
+/* Reads the rows of a tile. Any thread. */
+int trip_point_tiles_read(const trip_point_tiles *t, uint64_t tile, trip_point_row *rows);
+
+/* Takes memory for searches by so many threads: up to half of the memory that is left. */
+int trip_point_tiles_begin_searches(trip_point_tiles *t, unsigned threads);
+/* Finds the nearest neighbours of n->position, which lies in a tile. Each thread has a number of
+ * its own. */
+int trip_point_tiles_search(trip_point_tiles *t, unsigned thread, uint64_t tile,
+                            trip_neighbours *n);
+
+#endif

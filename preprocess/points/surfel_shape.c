@@ -1,0 +1,152 @@
+#include "surfel_shape.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "geometry.h"
+
+enum { SWEEPS = 12 };
+
+/* A matrix is diagonal if the other values are at most this part of its diagonal. */
+#define DIAGONAL 1e-14
+
+/* Neighbours are on a line if the second variance is at most this part of the greatest. */
+#define LINE 1e-8
+
+/* Turns a symmetric matrix to a diagonal one by Jacobi's rotations. The columns of `axes` become
+ * its eigenvectors. */
+static void diagonalise(double m[3][3], double axes[3][3])
+{
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++)
+            axes[i][j] = i == j;
+    for (int sweep = 0; sweep < SWEEPS; sweep++) {
+        const double beside = fabs(m[0][1]) + fabs(m[0][2]) + fabs(m[1][2]);
+        if (beside <= DIAGONAL * (fabs(m[0][0]) + fabs(m[1][1]) + fabs(m[2][2])))
+            return;
+        for (int p = 0; p < 2; p++)
+            for (int q = p + 1; q < 3; q++) {
+                if (m[p][q] == 0)
+                    continue;
+                const double theta = (m[q][q] - m[p][p]) / (2 * m[p][q]);
+                const double t = copysign(1, theta) / (fabs(theta) + sqrt(theta * theta + 1));
+                const double c = 1 / sqrt(t * t + 1), s = t * c, all = m[p][q];
+                const int r = 3 - p - q;
+                const double rp = m[r][p], rq = m[r][q];
+                m[p][p] -= t * all;
+                m[q][q] += t * all;
+                m[p][q] = m[q][p] = 0;
+                m[r][p] = m[p][r] = c * rp - s * rq;
+                m[r][q] = m[q][r] = s * rp + c * rq;
+                for (int i = 0; i < 3; i++) {
+                    const double ip = axes[i][p], iq = axes[i][q];
+                    axes[i][p] = c * ip - s * iq;
+                    axes[i][q] = s * ip + c * iq;
+                }
+            }
+    }
+}
+
+static trip_vec3 column(const double axes[3][3], int i)
+{
+    return trip_v3(axes[0][i], axes[1][i], axes[2][i]);
+}
+
+/* Returns a direction of unit length across a line, as near to `towards` as possible. */
+static trip_vec3 across(trip_vec3 line, trip_vec3 towards)
+{
+    const trip_vec3 side = trip_sub(towards, trip_scale(line, trip_dot(towards, line)));
+    if (trip_length(side) > 1e-6 * trip_length(towards))
+        return trip_normalize(side);
+    const trip_vec3 other = fabs(line.z) < 0.7 ? trip_v3(0, 0, 1) : trip_v3(1, 0, 0);
+    return trip_normalize(trip_sub(other, trip_scale(line, trip_dot(other, line))));
+}
+
+static trip_vec3 normal_of(double variance[3][3], trip_vec3 towards)
+{
+    double axes[3][3];
+    int order[3] = { 0, 1, 2 };
+    diagonalise(variance, axes);
+    for (int i = 0; i < 2; i++)
+        for (int j = 0; j < 2 - i; j++)
+            if (variance[order[j]][order[j]] > variance[order[j + 1]][order[j + 1]]) {
+                const int other = order[j];
+                order[j] = order[j + 1];
+                order[j + 1] = other;
+            }
+    const double middle = variance[order[1]][order[1]], most = variance[order[2]][order[2]];
+    if (!(most > 0))
+        return trip_normalize(towards);
+    if (!(middle > LINE * most))
+        return across(trip_normalize(column(axes, order[2])), towards);
+    const trip_vec3 n = trip_normalize(column(axes, order[0]));
+    return trip_dot(n, towards) < 0 ? trip_scale(n, -1) : n;
+}
+
+/* Sums over the neighbours' offsets from the point, in units of their reach. The point adds 0. */
+typedef struct sums {
+    double offset[3];
+    double xx, xy, xz, yy, yz, zz;
+} sums;
+
+static sums sum_offsets(const trip_neighbours *n, double unit)
+{
+    sums s = { .xx = 0 };
+    for (unsigned i = 0; i < n->count; i++) {
+        const double *p = n->nearest[i].position;
+        const double x = (p[0] - n->position[0]) / unit, y = (p[1] - n->position[1]) / unit,
+                     z = (p[2] - n->position[2]) / unit;
+        s.offset[0] += x;
+        s.offset[1] += y;
+        s.offset[2] += z;
+        s.xx += x * x;
+        s.xy += x * y;
+        s.xz += x * z;
+        s.yy += y * y;
+        s.yz += y * z;
+        s.zz += z * z;
+    }
+    return s;
+}
+
+/* Returns the mean square distance of the neighbours from their mean. */
+static double spread2(const sums *s, double count)
+{
+    const double mean2 =
+        (s->offset[0] * s->offset[0] + s->offset[1] * s->offset[1] + s->offset[2] * s->offset[2]) /
+        (count * count);
+    return fmax(0, (s->xx + s->yy + s->zz) / count - mean2);
+}
+
+/* Sets the covariances of the neighbours and the point. */
+static void set_variance(const sums *s, double count, double variance[3][3])
+{
+    const double squares[3][3] = { { s->xx, s->xy, s->xz },
+                                   { s->xy, s->yy, s->yz },
+                                   { s->xz, s->yz, s->zz } };
+    for (int a = 0; a < 3; a++)
+        for (int b = 0; b < 3; b++)
+            variance[a][b] = squares[a][b] / count - s->offset[a] * s->offset[b] / count / count;
+}
+
+trip_surfel_shape trip_surfel_shape_of(const trip_neighbours *n, const double towards[3])
+{
+    trip_vec3 to = trip_v3(towards[0], towards[1], towards[2]);
+    if (!(trip_length(to) > 0))
+        to = trip_v3(0, 0, 1);
+    to = trip_normalize(to);
+    trip_surfel_shape s = { .radius = INFINITY, .normal = { to.x, to.y, to.z } };
+    if (n->count == 0)
+        return s;
+    double variance[3][3], reach = sqrt(n->nearest[n->count - 1].distance2);
+    const sums all = sum_offsets(n, reach);
+    set_variance(&all, n->count + 1, variance);
+    if (n->count >= TRIP_NEIGHBOURS_MIN)
+        reach *= fmin(1, TRIP_SURFEL_SPREAD * sqrt(spread2(&all, n->count)));
+    s.radius = reach * sqrt(M_PI / 2 / n->count);
+    const trip_vec3 normal = normal_of(variance, to);
+    s.normal[0] = normal.x;
+    s.normal[1] = normal.y;
+    s.normal[2] = normal.z;
+    return s;
+}
