@@ -390,7 +390,7 @@ class Serve(program.ProgramTest):
         self.assertTrue(status["scene"]["text"].startswith("1 volume and 1 scene, 800 Gaussians by depth, "), status)
         self.assertEqual([c["name"] for c in status["scene"]["choices"]], ["kernel", "sh"])
         applies = status["scene"]["applies"]
-        for name in "lod", "max-ms", "show", "sheet", "depth", "count":
+        for name in "lod", "max-ms", "show", "sheet", "count":
             self.assertNotIn(name, applies)
         self.assertEqual({"light", "switches"} & set(status), set())
         for name, value in (("kernel", "exact"), ("opacity", "3"), ("no-shading", "1"), ("classify", "post"),
