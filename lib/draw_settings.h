@@ -135,6 +135,12 @@ typedef enum draw_kind {
     DRAW_KIND_CLOUD,
     DRAW_KIND_OBJECTS /* volumes with places, alone or beside Gaussian scenes */
 } draw_kind;
+
+/* Whether all data are Gaussians. */
+static inline bool draw_kind_is_gaussian(int kind)
+{
+    return kind == DRAW_KIND_SCENE || kind == DRAW_KIND_CLOUD;
+}
 /* Checks that all settings and resources apply to a kind of data. */
 int draw_settings_check_kind(const draw_settings *s, const triptych_resources *r, draw_kind kind);
 /* Returns whether a row applies, with the other settings as they are. */

@@ -129,6 +129,17 @@ static void add_box(const trip_gaussian_transform *t, const double from_lo[3],
         }
 }
 
+/* Clouds alone have light. */
+static draw_kind kind_of(const triptych *t)
+{
+    bool clouds = true;
+    if (t->mixed)
+        return DRAW_KIND_OBJECTS;
+    for (unsigned i = 0; i < t->placed_count; i++)
+        clouds &= (t->placed[i].set->header.flags & TRIP_GAUSSIAN_CLOUD) != 0;
+    return clouds ? DRAW_KIND_CLOUD : DRAW_KIND_SCENE;
+}
+
 /* Adds a scene to the description of all. */
 static void add_to_scene(const triptych *t, unsigned i, triptych_scene *out)
 {
@@ -172,6 +183,7 @@ int triptych_get_scene(triptych *t, triptych_scene *out)
     out->y_down = t->scene && t->scene->header.flags & TRIP_GAUSSIAN_Y_DOWN;
     out->z_up = t->scene && t->scene->header.flags & TRIP_GAUSSIAN_Z_UP;
     out->volumes = trip_context_count_mixed(t);
+    out->clouds = kind_of(t) == DRAW_KIND_CLOUD;
     out->objects = t->placed_count + out->volumes;
     out->moved = !is_alone(t);
     for (unsigned i = 0; i < t->placed_count; i++)
@@ -285,17 +297,6 @@ static int check_sheets(const triptych *t)
     return is_alone(t) || t->given.scene.order != TRIPTYCH_ORDER_SHEETS
                ? check_sheet(t)
                : trip_option_fail("--order", "sheets draws one scene alone, where it lies");
-}
-
-/* Clouds alone have light. */
-static draw_kind kind_of(const triptych *t)
-{
-    bool clouds = true;
-    if (t->mixed)
-        return DRAW_KIND_OBJECTS;
-    for (unsigned i = 0; i < t->placed_count; i++)
-        clouds &= (t->placed[i].set->header.flags & TRIP_GAUSSIAN_CLOUD) != 0;
-    return clouds ? DRAW_KIND_CLOUD : DRAW_KIND_SCENE;
 }
 
 static int check(const triptych *t)

@@ -224,6 +224,7 @@ typedef struct triptych_scene {
     double typical_lo[3], typical_hi[3];
     const char *notes;         /* JSON; belongs to the data set; NULL if only volumes are placed */
     unsigned objects, volumes; /* in the picture; volumes are counted in `objects` too */
+    int clouds;                /* all objects are clouds of points, which have light */
     int moved;                 /* several objects, or one with a place of its own */
 } triptych_scene;
 

@@ -185,7 +185,7 @@ static draw_kind kind_of(triptych *t)
     triptych_scene scene;
     if (!triptych_is_scene(t) || triptych_get_scene(t, &scene))
         return DRAW_KIND_VOLUME;
-    return scene.volumes ? DRAW_KIND_OBJECTS : DRAW_KIND_SCENE;
+    return scene.volumes ? DRAW_KIND_OBJECTS : scene.clouds ? DRAW_KIND_CLOUD : DRAW_KIND_SCENE;
 }
 
 static int open_data(trip_frames *f)
@@ -231,7 +231,7 @@ static int open_data(trip_frames *f)
  * scene file take no edited function. */
 static void drop_function_of_scene(trip_frames *f)
 {
-    if (f->kind == DRAW_KIND_SCENE) {
+    if (draw_kind_is_gaussian(f->kind)) {
         free((char *)(uintptr_t)f->now.function);
         f->now.function = NULL;
     }
@@ -610,10 +610,11 @@ static int draw_moving(trip_frames *f, double target_ms)
     const double detail = trip_pace_scale(&f->pace, wanted_pixels(f), MOVING_SHARE * target_ms);
     const double scale = sqrt(detail);
     draw_settings settings = with_levels(f, MOVING_LOD_PX * scale / detail, MOVING_MAX * target_ms);
-    if (f->kind != DRAW_KIND_SCENE && settings.sheet.samples <= 0 &&
+    if (!draw_kind_is_gaussian(f->kind) && settings.sheet.samples <= 0 &&
         draw_settings_may_use_sheets(&settings))
         settings.sheet.samples = MOVING_SAMPLES;
-    if (f->kind != DRAW_KIND_SCENE && settings.all.samples <= 0) /* scenes have one by default */
+    if (!draw_kind_is_gaussian(f->kind) &&
+        settings.all.samples <= 0) /* scenes have one by default */
         settings.all.samples = 1;
     return draw(f, scale, detail, &settings, true);
 }

@@ -203,7 +203,7 @@ const char *trip_viewer_heat(const trip_document *d)
 
 const char *trip_viewer_function(const trip_document *d)
 {
-    return d->kind == DRAW_KIND_SCENE ? NULL : d->function;
+    return draw_kind_is_gaussian(d->kind) ? NULL : d->function;
 }
 
 draw_settings trip_viewer_settings(const trip_document *d)
@@ -716,7 +716,7 @@ static void drop(trip_viewer *v, const char *path)
     const char *dot = strrchr(path, '.');
     const trip_document *d = trip_viewer_document(v);
     const bool is_function = dot && !strcmp(dot, ".tf") && d;
-    if (is_function && d->kind == DRAW_KIND_SCENE)
+    if (is_function && draw_kind_is_gaussian(d->kind))
         trip_viewer_say(v, "a Gaussian scene has colours of its own: no transfer function applies");
     else if (is_function && d->kind)
         trip_viewer_say(v, "--tf and the scene file choose the transfer functions of its volumes");

@@ -580,6 +580,14 @@ class View(program.ProgramTest):
         self.assertEqual((self.status()["gaussians"], self.status()["order"]), (800, "lists"))
         self.expect_render("seen", "status.json", "scene.ply")
 
+    def test_a_light_falls_on_a_cloud_of_points(self):
+        cloud = os.path.join(program.DATASETS, "lamp.ply")
+        lit, plain = (self.pictures("wait\npicture seen.exr\nstatus status.json\n", ["seen"], cloud, *light)[0]
+                      for light in (["--light=1,0.2,0"], []))
+        self.assertGreater(numpy.abs(lit - plain).max(), 0.1)
+        self.view("wait\npicture seen.exr\nstatus status.json\n", cloud, "--light=1,0.2,0")
+        self.expect_render("seen", "status.json", cloud, ["--light=1,0.2,0"])
+
     def test_scenes_with_y_down_stand_upright(self):
         """The red Gaussian has the least y, which is up."""
         colours = {-1: (1, 0, 0), 0: (0, 1, 0), 1: (0, 0, 1)}
