@@ -281,7 +281,7 @@ static void show_bytes(void *user, uint64_t done, uint64_t total)
 }
 
 /* Raise this with every change that makes the same scene give another data set. */
-enum { GAUSSIAN_BRICKER_VERSION = 2 };
+enum { GAUSSIAN_BRICKER_VERSION = 3 };
 
 static int describe_scene_form(const trip_brick_params *params, char **text)
 {

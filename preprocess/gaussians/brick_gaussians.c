@@ -20,6 +20,9 @@ enum {
     PROGRESS_EVERY = 1 << 14,
     CLASSES = 256,       /* class c has the index c + 128 */
     GROUP_RECORDS = 512, /* classes of a node with fewer records join larger classes */
+    READ_MIN = 1024,     /* splats that are read at once */
+    READ_MAX = 1 << 16,
+    READ_PART = 4, /* at most this part of the free memory */
 };
 
 /* The greatest mean error of colours by a palette that is selected by itself. */
@@ -51,7 +54,7 @@ typedef struct bricker {
     uint64_t *node_numbers; /* of the octree's nodes */
     uint64_t node_count;
     float *vectors; /* a sample of the coefficients */
-    uint64_t vector_count, vector_room, vectors_seen;
+    uint64_t vector_count, vector_room;
     trip_palette palette;
     double palette_error;
     /* These belong to the axis that is being written. */
@@ -73,9 +76,11 @@ static int fail_memory(const bricker *b)
                      "bricking needs more memory than --memory allows: raise --memory");
 }
 
-static void tell_progress(bricker *b)
+static void tell_progress(bricker *b, uint64_t count)
 {
-    if (++b->passed % PROGRESS_EVERY == 0 && b->p->progress)
+    const uint64_t before = b->passed / PROGRESS_EVERY;
+    b->passed += count;
+    if (b->passed / PROGRESS_EVERY > before && b->p->progress)
         b->p->progress(b->p->progress_user, b->passed);
 }
 
@@ -124,7 +129,7 @@ static int spool_splat(bricker *b, trip_gaussian *g)
 {
     unsigned char spilled[sizeof(trip_spilled) + sizeof *g] = { 0 };
     const trip_spilled head = { .number = b->records };
-    tell_progress(b);
+    tell_progress(b, 1);
     if (!repair(g, b->p->degree)) {
         b->dropped++;
         return TRIP_OK;
@@ -262,7 +267,7 @@ static int gather(void *user, const unsigned char *spilled)
     }
     memcpy(trip_gaussian_encoder_room(b->encoder) + b->gathered++ * b->stride, spilled, b->stride);
     b->leaf_left--;
-    tell_progress(b);
+    tell_progress(b, 1);
     return b->gathered == b->piece ? send_gathered(b) : TRIP_OK;
 }
 
@@ -302,8 +307,8 @@ static int count_splat(void *user, const unsigned char *spilled)
     bricker *b = user;
     trip_spilled head = { .number = b->numbered++ };
     const trip_gaussian *g = (const void *)(spilled + sizeof(trip_spilled));
-    tell_progress(b);
-    int status = trip_gaussian_levels_add(b->levels, g, &head.group);
+    tell_progress(b, 1);
+    int status = trip_gaussian_levels_count(b->levels, g, &head.group);
     if (status == TRIP_OK)
         status = trip_output_append(&b->ordered, &head, sizeof head);
     b->groups[group_of(b, head.group, class_of(g))]++;
@@ -329,30 +334,24 @@ static int emit_coarse(void *user, uint64_t node, const trip_gaussian *g)
     return trip_output_append(&b->merged, spilled, b->stride);
 }
 
-/* Calls `use` for each splat of the spool. The encoder's room serves for reading too. */
-static int for_each_splat(bricker *b, uint64_t records,
-                          int (*use)(bricker *b, const unsigned char *spilled))
+static int merge_splats(bricker *b)
 {
-    unsigned char *buffer = trip_gaussian_encoder_room(b->encoder);
-    const uint64_t step = TRIP_GAUSSIAN_BRICK_RECORDS_MAX;
-    int status = TRIP_OK;
-    for (uint64_t first = 0; first < records && status == TRIP_OK; first += step) {
-        const uint64_t left = records - first, count = left < step ? left : step;
+    const uint64_t part = trip_budget_left_bytes(b->budget) / READ_PART / b->stride;
+    const uint64_t step = part < READ_MIN ? READ_MIN : part > READ_MAX ? READ_MAX : part;
+    unsigned char *buffer = trip_budget_take(b->budget, step * b->stride);
+    int status = buffer ? TRIP_OK : fail_memory(b);
+    for (uint64_t first = 0; first < b->records && status == TRIP_OK; first += step) {
+        const uint64_t left = b->records - first, count = left < step ? left : step;
         status = trip_output_read(&b->spool, first * b->stride, buffer, count * b->stride);
-        for (uint64_t i = 0; i < count && status == TRIP_OK; i++)
-            status = use(b, buffer + i * b->stride);
+        if (status == TRIP_OK)
+            status = trip_gaussian_levels_merge(b->levels, buffer + sizeof(trip_spilled), b->stride,
+                                                count);
         if (status == TRIP_OK)
             status = check_interrupted(b);
+        tell_progress(b, count);
     }
+    trip_budget_release(b->budget, buffer, step * b->stride);
     return status;
-}
-
-static int merge_splat(bricker *b, const unsigned char *spilled)
-{
-    uint64_t leaf;
-    tell_progress(b);
-    return trip_gaussian_levels_add(b->levels, (const void *)(spilled + sizeof(trip_spilled)),
-                                    &leaf);
 }
 
 /* Sorts the spool by the octree, and counts for the levels. */
@@ -375,7 +374,9 @@ static int order_spool(bricker *b)
     trip_output_close(&b->spool);
     b->spool = b->ordered;
     b->ordered = (trip_output){ .fd = -1 };
-    return status == TRIP_OK ? trip_gaussian_levels_end_pass(b->levels) : status;
+    if (status == TRIP_OK && !trip_gaussian_levels_select(b->levels))
+        status = fail_memory(b);
+    return status;
 }
 
 /* Gives the points of the sample their groups, and makes room for points of coarse splats. */
@@ -406,9 +407,9 @@ static int add_levels(bricker *b)
     if (status == TRIP_OK)
         status = make_output(b, &b->merged);
     if (status == TRIP_OK)
-        status = for_each_splat(b, b->records, merge_splat);
+        status = merge_splats(b);
     if (status == TRIP_OK)
-        status = trip_gaussian_levels_end_pass(b->levels);
+        status = trip_gaussian_levels_end(b->levels);
     if (status == TRIP_OK)
         status = trip_output_flush(&b->merged);
     if (status == TRIP_OK)
@@ -491,11 +492,13 @@ static int make_levels(bricker *b)
     b->groups = trip_budget_take(b->budget, b->groups_bytes);
     b->joined = (void *)(b->groups + (b->groups ? group_count(b) : 0));
     if (!b->groups ||
-        !trip_gaussian_levels_begin(
-            &b->levels,
-            &(trip_gaussian_levels_params){
-                .octree = &b->octree, .degree = b->p->degree, .emit = emit_coarse, .user = b },
-            b->budget))
+        !trip_gaussian_levels_begin(&b->levels,
+                                    &(trip_gaussian_levels_params){ .octree = &b->octree,
+                                                                    .degree = b->p->degree,
+                                                                    .workers = b->workers,
+                                                                    .emit = emit_coarse,
+                                                                    .user = b },
+                                    b->budget))
         return fail_memory(b);
     int status = order_spool(b);
     if (status == TRIP_OK)
@@ -511,15 +514,22 @@ static int make_levels(bricker *b)
 /* ---- palette ---- */
 
 /* Takes vector_room of all splats, at even distances. */
-static int take_vector(bricker *b, const unsigned char *spilled)
+static int take_vectors(bricker *b, uint64_t all)
 {
+    const size_t bytes = trip_palette_size(b->p->degree) * sizeof *b->vectors;
+    const double share = (double)b->vector_room / (double)all;
+    unsigned char *spilled = trip_gaussian_encoder_room(b->encoder);
     const trip_gaussian *g = (const void *)(spilled + sizeof(trip_spilled));
-    const unsigned size = trip_palette_size(b->p->degree);
-    const double share = (double)b->vector_room / (double)(b->records + b->coarse);
-    b->vectors_seen++;
-    if (b->vector_count < (uint64_t)((double)b->vectors_seen * share + 1e-6))
-        memcpy(b->vectors + size * b->vector_count++, g->sh[1], size * sizeof *b->vectors);
-    return TRIP_OK;
+    int status = TRIP_OK;
+    for (uint64_t i = 0; i < all && status == TRIP_OK; i++) {
+        if (i % PROGRESS_EVERY == 0)
+            status = check_interrupted(b);
+        if (status < 0 || b->vector_count >= (uint64_t)((double)(i + 1) * share + 1e-6))
+            continue;
+        status = trip_output_read(&b->spool, i * b->stride, spilled, b->stride);
+        memcpy((char *)b->vectors + bytes * b->vector_count++, g->sh[1], bytes);
+    }
+    return status;
 }
 
 static unsigned find_entry(const void *user, const unsigned char *splat)
@@ -543,7 +553,7 @@ static int make_palette(bricker *b)
     b->vectors = trip_budget_take(b->budget, bytes);
     if (!b->vectors)
         return fail_memory(b);
-    int status = for_each_splat(b, all, take_vector);
+    int status = take_vectors(b, all);
     if (status == TRIP_OK &&
         !trip_palette_build(&b->palette, b->vectors, b->vector_count, b->p->degree,
                             TRIP_GAUSSIAN_PALETTE_MAX, b->budget))
