@@ -22,7 +22,7 @@ bool trip_gaussian_encoder_create(trip_gaussian_encoder **out, trip_gaussian_wri
                                   trip_workers *workers, int degree, trip_budget *budget);
 /* Returns the room for the spilled splats of the next piece (gaussian_sort.h). */
 unsigned char *trip_gaussian_encoder_room(const trip_gaussian_encoder *e);
-/* Takes the piece whose splats lie in the room. A piece with a wide gap becomes several bricks. */
+/* Takes the piece in the room. A piece with a wide gap becomes several bricks. */
 int trip_gaussian_encoder_send(trip_gaussian_encoder *e, const trip_gaussian_piece *piece);
 /* Waits until the writer has all bricks. No loop runs then. */
 int trip_gaussian_encoder_finish(trip_gaussian_encoder *e);

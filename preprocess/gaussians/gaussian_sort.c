@@ -13,6 +13,7 @@ enum {
     READ_BYTES_MIN = 1 << 14, /* of the buffer of a run that is merged */
     READ_BYTES_MAX = 1 << 20,
     RECORDS_MIN = 1024,    /* of a run */
+    READ_SPLATS = 1024,    /* are read at once */
     CHECK_EVERY = 1 << 14, /* splats between two checks for an interruption */
 };
 
@@ -92,20 +93,34 @@ static void count_groups(const sorter *s, const trip_key *keys, size_t count)
     }
 }
 
-/* Reads a run into a slice and sorts it by keys. */
+/* Reads a run into a slice in parts, and makes keys of the coordinates. */
+static int read_run(const sorter *s, uint64_t number, unsigned char *slice, trip_key *keys)
+{
+    const size_t count = run_length(s, number);
+    const uint64_t at = number * s->run_splats * s->stride;
+    int status = TRIP_OK;
+    for (size_t i = 0; i < count && status == TRIP_OK;) {
+        const size_t end = count - i < READ_SPLATS ? count : i + READ_SPLATS;
+        unsigned char *spilled = slice + i * s->stride;
+        status = trip_output_read(s->p->spool, at + i * s->stride, spilled, (end - i) * s->stride);
+        for (; i < end && status == TRIP_OK; i++, spilled += s->stride) {
+            s->p->place(s->p->user, splat(spilled), (void *)spilled);
+            keys[i] = (trip_key){ trip_key_of(head(spilled)->at), i };
+        }
+        if (status == TRIP_OK)
+            status = check_interrupted(s);
+    }
+    return status;
+}
+
+/* Sorts a run in a slice by keys. */
 static int sort_run(const sorter *s, uint64_t number, unsigned char *slice)
 {
     const size_t count = run_length(s, number);
     trip_key *keys = keys_of(s, slice), *scratch = keys + s->run_splats;
-    const int status =
-        trip_output_read(s->p->spool, number * s->run_splats * s->stride, slice, count * s->stride);
+    const int status = read_run(s, number, slice, keys);
     if (status < 0)
         return status;
-    for (size_t i = 0; i < count; i++) {
-        unsigned char *spilled = slice + i * s->stride;
-        s->p->place(s->p->user, splat(spilled), (void *)spilled);
-        keys[i] = (trip_key){ trip_key_of(head(spilled)->at), i };
-    }
     trip_key_sort(keys, scratch, count);
     for (size_t i = 0; i < count; i++)
         keys[i].key = head(slice + keys[i].number * s->stride)->group;
