@@ -483,8 +483,8 @@ static int brick(triptych *t, const options *o)
 /* Refuses options that bricking a scene would ignore. */
 static int check_scene_options(const options *o, bool cloud)
 {
-    const char *const used[] = { "force", "json", "output", "memory",
-                                 cloud ? "threads" : "harmonics" };
+    const char *const used[] = { "force",  "json",    "output",
+                                 "memory", "threads", cloud ? "threads" : "harmonics" };
     for (size_t i = 0; i < brick_table.count; i++) {
         bool is_used = !trip_option_is_set(&rows[i], o);
         for (size_t n = 0; n < sizeof used / sizeof *used; n++)

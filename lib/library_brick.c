@@ -287,7 +287,7 @@ static void show_bytes(void *user, uint64_t done, uint64_t total)
 }
 
 /* Raise this with every change that makes the same scene give another data set. */
-enum { GAUSSIAN_BRICKER_VERSION = 2, POINT_BRICKER_VERSION = 1 };
+enum { GAUSSIAN_BRICKER_VERSION = 3, POINT_BRICKER_VERSION = 1 };
 
 static int describe_scene_form(const trip_brick_params *params, char **text)
 {

@@ -183,6 +183,7 @@ static int brick(bricking *b, const char *path, const char *data_set,
                  (info->flat ? TRIP_GAUSSIAN_FLAT : 0) |
                  (!strcmp(info->up, "-y") ? TRIP_GAUSSIAN_Y_DOWN : 0),
         .text = notes,
+        .threads = trip_context_threads(options->threads),
         .progress = show_passed,
         .progress_user = b,
     };

@@ -145,6 +145,14 @@ int trip_output_flush(trip_output *o)
     return TRIP_OK;
 }
 
+int trip_output_reserve(trip_output *o, uint64_t bytes)
+{
+    const int status = has_file(o) ? TRIP_OK : create_unnamed(o);
+    if (status == TRIP_OK)
+        o->bytes = bytes;
+    return status;
+}
+
 int trip_output_append(trip_output *o, const void *data, size_t bytes)
 {
     const unsigned char *p = data;
@@ -189,6 +197,12 @@ int trip_output_read(const trip_output *o, uint64_t offset, void *data, size_t b
     return TRIP_OK;
 }
 
+void trip_output_announce_read(const trip_output *o, uint64_t offset, uint64_t bytes)
+{
+    if (has_file(o) && bytes)
+        posix_fadvise(o->fd, (off_t)offset, (off_t)bytes, POSIX_FADV_WILLNEED);
+}
+
 int trip_output_append_output(trip_output *o, trip_output *from)
 {
     unsigned char part[16384];
@@ -209,7 +223,7 @@ int trip_output_align(trip_output *o, size_t alignment)
     return trip_output_append(o, zeros, (alignment - o->bytes % alignment) % alignment);
 }
 
-int trip_output_patch(trip_output *o, uint64_t offset, const void *data, size_t bytes)
+int trip_output_patch(const trip_output *o, uint64_t offset, const void *data, size_t bytes)
 {
     int error = trip_flusher_write(o->fd, data, bytes, offset);
     return error ? fail_write(o, offset, error) : TRIP_OK;

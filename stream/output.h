@@ -50,9 +50,13 @@ int trip_output_align(trip_output *o, size_t alignment);
 /* Writes the buffered bytes. A short last page gets its checksum now, so no bytes may follow. An
  * unnamed file that fits into the buffer is not written. */
 int trip_output_flush(trip_output *o);
+/* Gives an empty unnamed file its length. Several threads may then patch different parts of it. */
+int trip_output_reserve(trip_output *o, uint64_t bytes);
 /* Reads back flushed bytes. */
 int trip_output_read(const trip_output *o, uint64_t offset, void *data, size_t bytes);
-int trip_output_patch(trip_output *o, uint64_t offset, const void *data, size_t bytes);
+/* Tells the system that these bytes will be read soon. */
+void trip_output_announce_read(const trip_output *o, uint64_t offset, uint64_t bytes);
+int trip_output_patch(const trip_output *o, uint64_t offset, const void *data, size_t bytes);
 /* Lets a flusher sync the file. trip_output_sync() then waits for it. No bytes may follow. */
 int trip_output_start_sync(trip_output *o);
 int trip_output_sync(trip_output *o);

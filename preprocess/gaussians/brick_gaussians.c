@@ -3,6 +3,7 @@
 #include "folder.h"
 #include "gaussian_check.h"
 #include "gaussian_code.h"
+#include "gaussian_encoder.h"
 #include "gaussian_levels.h"
 #include "gaussian_sort.h"
 #include "gaussian_writer.h"
@@ -19,20 +20,20 @@ enum {
     PROGRESS_EVERY = 1 << 14,
     CLASSES = 256,       /* class c has the index c + 128 */
     GROUP_RECORDS = 512, /* classes of a node with fewer records join larger classes */
+    READ_MIN = 1024,     /* splats that are read at once */
+    READ_MAX = 1 << 16,
+    READ_PART = 4, /* at most this part of the free memory */
 };
 
-/* Precision of a brick's centres: the box has 2^21 codes along an axis. A splat is large enough
- * for a box of 2^15 times its class. */
-#define BOX_CLASSES 32768.0
 /* The greatest mean error of colours by a palette that is selected by itself. */
 #define PALETTE_ERROR (0.5 / 255)
-/* A gap that divides a brick is at least this part of its box. */
-#define GAP_PART 0.25
 
 typedef struct bricker {
     const trip_brick_gaussians_params *p;
     trip_budget *budget;
+    trip_workers *workers;
     trip_gaussian_writer *writer;
+    trip_gaussian_encoder *encoder;
     const char *folder;
     size_t stride;
     trip_output spool; /* the splats as they come, then in the octree's order */
@@ -45,6 +46,7 @@ typedef struct bricker {
     trip_octree octree;
     trip_gaussian_levels *levels;
     trip_output ordered, merged; /* the next spool: splats of the scene, coarse splats */
+    uint64_t numbered;           /* splats of the next spool */
     uint64_t *groups;            /* records by node and class; see group_of() */
     size_t groups_bytes;
     uint8_t *joined; /* class index of the group that a group joins */
@@ -52,7 +54,7 @@ typedef struct bricker {
     uint64_t *node_numbers; /* of the octree's nodes */
     uint64_t node_count;
     float *vectors; /* a sample of the coefficients */
-    uint64_t vector_count, vector_room, vectors_seen;
+    uint64_t vector_count, vector_room;
     trip_palette palette;
     double palette_error;
     /* These belong to the axis that is being written. */
@@ -61,9 +63,6 @@ typedef struct bricker {
     uint64_t leaf;            /* of the gathered splats */
     uint64_t leaf_left;       /* splats of the leaf that are not yet gathered */
     unsigned gathered, piece; /* splats in the buffer, and the number that fills it */
-    unsigned char *buffer;
-    const unsigned char **splats, **others; /* addresses in the buffer */
-    trip_key *keys, *scratch;
 } bricker;
 
 static const char *source_name(const bricker *b)
@@ -77,9 +76,11 @@ static int fail_memory(const bricker *b)
                      "bricking needs more memory than --memory allows: raise --memory");
 }
 
-static void tell_progress(bricker *b)
+static void tell_progress(bricker *b, uint64_t count)
 {
-    if (++b->passed % PROGRESS_EVERY == 0 && b->p->progress)
+    const uint64_t before = b->passed / PROGRESS_EVERY;
+    b->passed += count;
+    if (b->passed / PROGRESS_EVERY > before && b->p->progress)
         b->p->progress(b->p->progress_user, b->passed);
 }
 
@@ -128,7 +129,7 @@ static int spool_splat(bricker *b, trip_gaussian *g)
 {
     unsigned char spilled[sizeof(trip_spilled) + sizeof *g] = { 0 };
     const trip_spilled head = { .number = b->records };
-    tell_progress(b);
+    tell_progress(b, 1);
     if (!repair(g, b->p->degree)) {
         b->dropped++;
         return TRIP_OK;
@@ -192,9 +193,10 @@ static void add_point(bricker *b, const unsigned char *spilled)
     to->group = (uint64_t)class_of(g); /* set_groups_of_sample() adds the node */
 }
 
-/* The buffer of bricks serves for reading too. */
+/* The encoder's room serves for reading too. */
 static int take_sample(bricker *b)
 {
+    unsigned char *buffer = trip_gaussian_encoder_room(b->encoder);
     const uint64_t step = TRIP_GAUSSIAN_BRICK_RECORDS_MAX;
     int status = TRIP_OK;
     b->sample_bytes = trip_gaussian_sample_room(b->records) * sizeof *b->sample.points;
@@ -203,10 +205,10 @@ static int take_sample(bricker *b)
         return fail_memory(b);
     for (uint64_t first = 0; first < b->records && status == TRIP_OK; first += step) {
         const uint64_t left = b->records - first, count = left < step ? left : step;
-        status = trip_output_read(&b->spool, first * b->stride, b->buffer, count * b->stride);
+        status = trip_output_read(&b->spool, first * b->stride, buffer, count * b->stride);
         for (uint64_t i = 0; i < count && status == TRIP_OK; i++)
             if (trip_gaussian_is_sampled(first + i, b->records))
-                add_point(b, b->buffer + i * b->stride);
+                add_point(b, buffer + i * b->stride);
         if (status == TRIP_OK)
             status = check_interrupted(b);
     }
@@ -232,72 +234,17 @@ static int find_typical(bricker *b)
     return TRIP_OK;
 }
 
-static double centre_of(const unsigned char *splat, int axis)
+static int send_gathered(bricker *b)
 {
-    return ((const trip_gaussian *)(const void *)splat)->centre[axis];
-}
-
-/* Returns whether a box is too long along an axis for precise codes, and has a wide gap. Sets
- * *from to the first coordinate behind the gap. */
-static bool find_gap(const bricker *b, const unsigned char **splats, unsigned count, int axis,
-                     double size, double *from)
-{
-    double lo = INFINITY, hi = -INFINITY, widest = 0;
-    for (unsigned i = 0; i < count; i++) {
-        lo = fmin(lo, centre_of(splats[i], axis));
-        hi = fmax(hi, centre_of(splats[i], axis));
-    }
-    if (!(hi - lo > BOX_CLASSES * size))
-        return false;
-    for (unsigned i = 0; i < count; i++)
-        b->keys[i] = (trip_key){ trip_key_of(centre_of(splats[i], axis)), i };
-    trip_key_sort(b->keys, b->scratch, count);
-    for (unsigned i = 1; i < count; i++) {
-        const double at = centre_of(splats[b->keys[i].number], axis);
-        const double gap = at - centre_of(splats[b->keys[i - 1].number], axis);
-        if (gap > widest)
-            widest = gap, *from = at;
-    }
-    return widest > GAP_PART * (hi - lo);
-}
-
-/* Moves the splats behind a gap to the end and keeps the order. Returns the number before it. */
-static unsigned divide(const bricker *b, const unsigned char **splats, unsigned count, int axis,
-                       double from)
-{
-    unsigned left = 0, right = 0;
-    for (unsigned i = 0; i < count; i++)
-        if (centre_of(splats[i], axis) < from)
-            splats[left++] = splats[i];
-        else
-            b->others[right++] = splats[i];
-    memcpy(splats + left, b->others, right * sizeof *splats);
-    return left;
-}
-
-/* Writes splats as a brick. Strays get bricks of their own, so that no other loses precision. */
-static int write_brick(bricker *b, const unsigned char **splats, unsigned count)
-{
-    const uint64_t group = b->tree.leaves[b->leaf].group, node = group / class_count(b);
-    const int size_class = (int)(group % class_count(b)) + b->class_lo - CLASSES / 2;
-    double from = 0;
-    for (int axis = 0; axis < 3; axis++)
-        if (find_gap(b, splats, count, axis, ldexp(1, 2 * size_class), &from)) {
-            const unsigned left = divide(b, splats, count, axis, from);
-            const int status = write_brick(b, splats, left);
-            return status == TRIP_OK ? write_brick(b, splats + left, count - left) : status;
-        }
-    return trip_gaussian_writer_append(b->writer, b->axis, b->node_numbers[node], size_class,
-                                       splats, count);
-}
-
-static int write_gathered(bricker *b)
-{
-    const unsigned count = b->gathered;
-    for (unsigned i = 0; i < count; i++)
-        b->splats[i] = b->buffer + i * b->stride + sizeof(trip_spilled);
+    const uint64_t group = b->tree.leaves[b->leaf].group;
+    const trip_gaussian_piece piece = {
+        .axis = b->axis,
+        .node = b->node_numbers[group / class_count(b)],
+        .size_class = (int)(group % class_count(b)) + b->class_lo - CLASSES / 2,
+        .count = b->gathered,
+    };
     b->gathered = 0;
-    return count ? write_brick(b, b->splats, count) : TRIP_OK;
+    return trip_gaussian_encoder_send(b->encoder, &piece);
 }
 
 /* A leaf with too many splats becomes several bricks with equal numbers. */
@@ -318,10 +265,10 @@ static int gather(void *user, const unsigned char *spilled)
         b->leaf = leaf;
         b->piece = piece_of(b->leaf_left);
     }
-    memcpy(b->buffer + b->gathered++ * b->stride, spilled, b->stride);
+    memcpy(trip_gaussian_encoder_room(b->encoder) + b->gathered++ * b->stride, spilled, b->stride);
     b->leaf_left--;
-    tell_progress(b);
-    return b->gathered == b->piece ? write_gathered(b) : TRIP_OK;
+    tell_progress(b, 1);
+    return b->gathered == b->piece ? send_gathered(b) : TRIP_OK;
 }
 
 /* ---- levels ---- */
@@ -354,16 +301,20 @@ static void place_in_octree(void *user, const trip_gaussian *g, trip_spilled *he
     head->at = (double)trip_octree_order(&p, b->octree.nodes[head->group].depth);
 }
 
-/* Counts a splat in the octree's order. */
+/* Counts a splat in the octree's order, and gives it a number in this order. */
 static int count_splat(void *user, const unsigned char *spilled)
 {
     bricker *b = user;
+    trip_spilled head = { .number = b->numbered++ };
     const trip_gaussian *g = (const void *)(spilled + sizeof(trip_spilled));
-    uint64_t leaf;
-    tell_progress(b);
-    const int status = trip_gaussian_levels_add(b->levels, g, &leaf);
-    b->groups[group_of(b, leaf, class_of(g))]++;
-    return status == TRIP_OK ? trip_output_append(&b->ordered, spilled, b->stride) : status;
+    tell_progress(b, 1);
+    int status = trip_gaussian_levels_count(b->levels, g, &head.group);
+    if (status == TRIP_OK)
+        status = trip_output_append(&b->ordered, &head, sizeof head);
+    b->groups[group_of(b, head.group, class_of(g))]++;
+    return status == TRIP_OK
+               ? trip_output_append(&b->ordered, spilled + sizeof head, b->stride - sizeof head)
+               : status;
 }
 
 static int emit_coarse(void *user, uint64_t node, const trip_gaussian *g)
@@ -383,29 +334,24 @@ static int emit_coarse(void *user, uint64_t node, const trip_gaussian *g)
     return trip_output_append(&b->merged, spilled, b->stride);
 }
 
-/* Calls `use` for each splat of the spool. The buffer of bricks serves for reading too. */
-static int for_each_splat(bricker *b, uint64_t records,
-                          int (*use)(bricker *b, const unsigned char *spilled))
+static int merge_splats(bricker *b)
 {
-    const uint64_t step = TRIP_GAUSSIAN_BRICK_RECORDS_MAX;
-    int status = TRIP_OK;
-    for (uint64_t first = 0; first < records && status == TRIP_OK; first += step) {
-        const uint64_t left = records - first, count = left < step ? left : step;
-        status = trip_output_read(&b->spool, first * b->stride, b->buffer, count * b->stride);
-        for (uint64_t i = 0; i < count && status == TRIP_OK; i++)
-            status = use(b, b->buffer + i * b->stride);
+    const uint64_t part = trip_budget_left_bytes(b->budget) / READ_PART / b->stride;
+    const uint64_t step = part < READ_MIN ? READ_MIN : part > READ_MAX ? READ_MAX : part;
+    unsigned char *buffer = trip_budget_take(b->budget, step * b->stride);
+    int status = buffer ? TRIP_OK : fail_memory(b);
+    for (uint64_t first = 0; first < b->records && status == TRIP_OK; first += step) {
+        const uint64_t left = b->records - first, count = left < step ? left : step;
+        status = trip_output_read(&b->spool, first * b->stride, buffer, count * b->stride);
+        if (status == TRIP_OK)
+            status = trip_gaussian_levels_merge(b->levels, buffer + sizeof(trip_spilled), b->stride,
+                                                count);
         if (status == TRIP_OK)
             status = check_interrupted(b);
+        tell_progress(b, count);
     }
+    trip_budget_release(b->budget, buffer, step * b->stride);
     return status;
-}
-
-static int merge_splat(bricker *b, const unsigned char *spilled)
-{
-    uint64_t leaf;
-    tell_progress(b);
-    return trip_gaussian_levels_add(b->levels, (const void *)(spilled + sizeof(trip_spilled)),
-                                    &leaf);
 }
 
 /* Sorts the spool by the octree, and counts for the levels. */
@@ -418,6 +364,7 @@ static int order_spool(bricker *b)
                                                                   .degree = b->p->degree,
                                                                   .folder = b->folder,
                                                                   .path = b->p->path,
+                                                                  .workers = b->workers,
                                                                   .place = place_in_octree,
                                                                   .emit = count_splat,
                                                                   .user = b },
@@ -427,7 +374,9 @@ static int order_spool(bricker *b)
     trip_output_close(&b->spool);
     b->spool = b->ordered;
     b->ordered = (trip_output){ .fd = -1 };
-    return status == TRIP_OK ? trip_gaussian_levels_end_pass(b->levels) : status;
+    if (status == TRIP_OK && !trip_gaussian_levels_select(b->levels))
+        status = fail_memory(b);
+    return status;
 }
 
 /* Gives the points of the sample their groups, and makes room for points of coarse splats. */
@@ -458,9 +407,9 @@ static int add_levels(bricker *b)
     if (status == TRIP_OK)
         status = make_output(b, &b->merged);
     if (status == TRIP_OK)
-        status = for_each_splat(b, b->records, merge_splat);
+        status = merge_splats(b);
     if (status == TRIP_OK)
-        status = trip_gaussian_levels_end_pass(b->levels);
+        status = trip_gaussian_levels_end(b->levels);
     if (status == TRIP_OK)
         status = trip_output_flush(&b->merged);
     if (status == TRIP_OK)
@@ -543,11 +492,13 @@ static int make_levels(bricker *b)
     b->groups = trip_budget_take(b->budget, b->groups_bytes);
     b->joined = (void *)(b->groups + (b->groups ? group_count(b) : 0));
     if (!b->groups ||
-        !trip_gaussian_levels_begin(
-            &b->levels,
-            &(trip_gaussian_levels_params){
-                .octree = &b->octree, .degree = b->p->degree, .emit = emit_coarse, .user = b },
-            b->budget))
+        !trip_gaussian_levels_begin(&b->levels,
+                                    &(trip_gaussian_levels_params){ .octree = &b->octree,
+                                                                    .degree = b->p->degree,
+                                                                    .workers = b->workers,
+                                                                    .emit = emit_coarse,
+                                                                    .user = b },
+                                    b->budget))
         return fail_memory(b);
     int status = order_spool(b);
     if (status == TRIP_OK)
@@ -563,15 +514,22 @@ static int make_levels(bricker *b)
 /* ---- palette ---- */
 
 /* Takes vector_room of all splats, at even distances. */
-static int take_vector(bricker *b, const unsigned char *spilled)
+static int take_vectors(bricker *b, uint64_t all)
 {
+    const size_t bytes = trip_palette_size(b->p->degree) * sizeof *b->vectors;
+    const double share = (double)b->vector_room / (double)all;
+    unsigned char *spilled = trip_gaussian_encoder_room(b->encoder);
     const trip_gaussian *g = (const void *)(spilled + sizeof(trip_spilled));
-    const unsigned size = trip_palette_size(b->p->degree);
-    const double share = (double)b->vector_room / (double)(b->records + b->coarse);
-    b->vectors_seen++;
-    if (b->vector_count < (uint64_t)((double)b->vectors_seen * share + 1e-6))
-        memcpy(b->vectors + size * b->vector_count++, g->sh[1], size * sizeof *b->vectors);
-    return TRIP_OK;
+    int status = TRIP_OK;
+    for (uint64_t i = 0; i < all && status == TRIP_OK; i++) {
+        if (i % PROGRESS_EVERY == 0)
+            status = check_interrupted(b);
+        if (status < 0 || b->vector_count >= (uint64_t)((double)(i + 1) * share + 1e-6))
+            continue;
+        status = trip_output_read(&b->spool, i * b->stride, spilled, b->stride);
+        memcpy((char *)b->vectors + bytes * b->vector_count++, g->sh[1], bytes);
+    }
+    return status;
 }
 
 static unsigned find_entry(const void *user, const unsigned char *splat)
@@ -595,7 +553,7 @@ static int make_palette(bricker *b)
     b->vectors = trip_budget_take(b->budget, bytes);
     if (!b->vectors)
         return fail_memory(b);
-    int status = for_each_splat(b, all, take_vector);
+    int status = take_vectors(b, all);
     if (status == TRIP_OK &&
         !trip_palette_build(&b->palette, b->vectors, b->vector_count, b->p->degree,
                             TRIP_GAUSSIAN_PALETTE_MAX, b->budget))
@@ -618,12 +576,17 @@ static int make_palette(bricker *b)
 
 static void place_in_tree(void *user, const trip_gaussian *g, trip_spilled *head)
 {
-    bricker *b = user;
+    const bricker *b = user;
     const uint64_t group = group_of(b, head->group, class_of(g));
     head->group =
         trip_gaussian_tree_leaf(&b->tree, g->centre, group_of(b, head->group, b->joined[group]));
     head->at = g->centre[b->axis];
-    b->tree.leaves[head->group].records++;
+}
+
+static void count_in_leaf(void *user, uint64_t leaf, uint64_t splats)
+{
+    bricker *b = user;
+    atomic_fetch_add_explicit(&b->tree.leaves[leaf].records, splats, memory_order_relaxed);
 }
 
 static int write_axis(bricker *b, int axis)
@@ -632,16 +595,19 @@ static int write_axis(bricker *b, int axis)
     b->leaf_left = 0;
     if (!trip_gaussian_tree_build(&b->tree, &b->sample, axis, b->groups, group_count(b), b->budget))
         return fail_memory(b);
-    const int status =
-        trip_gaussian_sort(&(trip_gaussian_sort_params){ .spool = &b->spool,
-                                                         .records = b->records + b->coarse,
-                                                         .degree = b->p->degree,
-                                                         .folder = b->folder,
-                                                         .path = b->p->path,
-                                                         .place = place_in_tree,
-                                                         .emit = gather,
-                                                         .user = b },
-                           b->budget);
+    int status = trip_gaussian_sort(&(trip_gaussian_sort_params){ .spool = &b->spool,
+                                                                  .records = b->records + b->coarse,
+                                                                  .degree = b->p->degree,
+                                                                  .folder = b->folder,
+                                                                  .path = b->p->path,
+                                                                  .workers = b->workers,
+                                                                  .place = place_in_tree,
+                                                                  .count = count_in_leaf,
+                                                                  .emit = gather,
+                                                                  .user = b },
+                                    b->budget);
+    if (status == TRIP_OK)
+        status = trip_gaussian_encoder_finish(b->encoder);
     trip_gaussian_tree_free(&b->tree);
     return status;
 }
@@ -649,7 +615,9 @@ static int write_axis(bricker *b, int axis)
 static int run_bricker(bricker *b)
 {
     const trip_brick_gaussians_params *p = b->p;
-    int status = trip_gaussian_writer_open(&b->writer,
+    int status = trip_workers_create(&b->workers, p->threads);
+    if (status == TRIP_OK)
+        status = trip_gaussian_writer_open(&b->writer,
                                            &(trip_gaussian_writer_params){ .path = p->path,
                                                                            .replace = p->replace,
                                                                            .degree = p->degree,
@@ -659,6 +627,8 @@ static int run_bricker(bricker *b)
     if (status < 0)
         return status;
     b->folder = p->temporary ? p->temporary : trip_gaussian_writer_folder(b->writer);
+    if (!trip_gaussian_encoder_create(&b->encoder, b->writer, b->workers, p->degree, b->budget))
+        return fail_memory(b);
     status = spool_all(b);
     if (status == TRIP_OK)
         status = take_sample(b);
@@ -677,6 +647,7 @@ static int run_bricker(bricker *b)
 
 static void free_bricker(bricker *b)
 {
+    trip_gaussian_encoder_free(b->encoder);
     trip_gaussian_writer_close(b->writer);
     trip_output_close(&b->spool);
     trip_output_close(&b->ordered);
@@ -690,24 +661,8 @@ static void free_bricker(bricker *b)
         trip_budget_release(b->budget, b->nodes, nodes_bytes(b));
     trip_octree_free(&b->octree);
     trip_palette_free(&b->palette);
+    trip_workers_destroy(b->workers);
     free(b);
-}
-
-static size_t room_bytes(const bricker *b)
-{
-    return TRIP_GAUSSIAN_BRICK_RECORDS_MAX *
-           (b->stride + 2 * sizeof(unsigned char *) + 2 * sizeof(trip_key));
-}
-
-/* Divides one block of memory into the tables of a brick. */
-static void set_room(bricker *b, unsigned char *room)
-{
-    const size_t count = TRIP_GAUSSIAN_BRICK_RECORDS_MAX;
-    b->buffer = room;
-    b->keys = (void *)(room + count * b->stride);
-    b->scratch = b->keys + count;
-    b->splats = (void *)(b->scratch + count);
-    b->others = b->splats + count;
 }
 
 int trip_brick_gaussians(const trip_brick_gaussians_params *params, trip_budget *budget,
@@ -723,18 +678,13 @@ int trip_brick_gaussians(const trip_brick_gaussians_params *params, trip_budget 
     b->class_lo = CLASSES;
     for (int a = 0; a < 3; a++)
         b->lo[a] = INFINITY, b->hi[a] = -INFINITY;
-    unsigned char *room = trip_budget_take(budget, room_bytes(b));
-    if (room)
-        set_room(b, room);
-    const int status = room ? run_bricker(b) : fail_memory(b);
+    const int status = run_bricker(b);
     if (result)
         *result = (trip_brick_gaussians_result){ .records = b->records,
                                                  .coarse = b->coarse,
                                                  .palette = b->palette.count,
                                                  .palette_error = b->palette_error,
                                                  .dropped = b->dropped };
-    if (room)
-        trip_budget_release(budget, room, room_bytes(b));
     free_bricker(b);
     return status;
 }

@@ -1,6 +1,6 @@
 /* Bricks a Gaussian scene: writes its data set from a source of splats, in the memory of a budget.
- * The data set depends on the splats and their order alone, not on the memory. An interruption, a
- * failure or a full disk leaves no file. */
+ * The data set depends on the splats and their order alone, not on memory and threads. An
+ * interruption, a failure or a full disk leaves no file. */
 #ifndef TRIP_BRICK_GAUSSIANS_H
 #define TRIP_BRICK_GAUSSIANS_H
 
@@ -31,6 +31,7 @@ typedef struct trip_brick_gaussians_params {
     trip_brick_harmonics harmonics;
     uint32_t flags;   /* trip_gaussian_flag (gaussian_format.h) */
     const char *text; /* JSON that the data set keeps; NULL means "{}" */
+    unsigned threads; /* 0 means one for each processor */
     /* Folder for temporary files, which have no names. NULL means the new data set's folder. */
     const char *temporary;
     /* Called now and then by the bricking thread. A scene is done when it has passed about 6 times:

@@ -5,7 +5,15 @@
 
 #include "report.h"
 
-enum { FEWER = 2, FEW = 4096, VOXELS = TRIP_OCTREE_DEPTH_MAX + TRIP_LEVEL_HALVINGS };
+enum {
+    FEWER = 2,
+    FEW = 4096,
+    VOXELS = TRIP_OCTREE_DEPTH_MAX + TRIP_LEVEL_HALVINGS,
+    CHUNK = 32, /* Gaussians of an item of work */
+    BATCH_MIN = 32,
+    BATCH_MAX = 8192,
+    MEMORY_PART = 4,
+};
 
 /* A Gaussian is merged if its deviations are at most this part of a voxel's width. */
 #define MERGED_PART 0.75
@@ -16,6 +24,14 @@ typedef struct part {
     uint64_t records;                         /* 0: not kept */
     unsigned halvings;
 } part;
+
+/* A coarse Gaussian that waits for the workers and for its turn. */
+typedef struct waiting {
+    uint64_t node;
+    bool merged; /* `g` comes from `moments` */
+    trip_gaussian g;
+    trip_gaussian_moments moments;
+} waiting;
 
 /* The voxel that is open at a depth. */
 typedef struct voxel {
@@ -35,11 +51,26 @@ struct trip_gaussian_levels {
     unsigned deepest;
     uint64_t coarse;
     voxel voxels[VOXELS];
+    /* These belong to the second pass. */
+    size_t batch; /* the most Gaussians of each table below */
+    void *tables;
+    waiting *filling, *sent;       /* queues: one is filled while workers merge the other */
+    size_t filled, sent_count;     /* Gaussians in them */
+    trip_gaussian_moments *own;    /* of the Gaussians that are added */
+    trip_gaussian_moments *coming; /* of the next ones, which workers find */
+    const unsigned char *next;     /* the next ones */
+    size_t stride, next_count, next_chunks;
+    bool running; /* a loop of the workers */
 };
 
 static size_t parts_bytes(const trip_octree *o)
 {
     return o->node_count * sizeof(part);
+}
+
+static size_t tables_bytes(const trip_gaussian_levels *l)
+{
+    return l->batch * 2 * (sizeof(waiting) + sizeof(trip_gaussian_moments));
 }
 
 bool trip_gaussian_levels_begin(trip_gaussian_levels **out,
@@ -59,6 +90,11 @@ void trip_gaussian_levels_free(trip_gaussian_levels *l)
     if (!l)
         return;
     trip_budget *budget = l->budget;
+    int status;
+    if (l->running)
+        trip_workers_wait(l->p.workers, 0, &status);
+    if (l->tables)
+        trip_budget_release(budget, l->tables, tables_bytes(l));
     trip_budget_release(budget, l->parts, parts_bytes(l->p.octree));
     trip_budget_release(budget, l, sizeof *l);
 }
@@ -66,6 +102,102 @@ void trip_gaussian_levels_free(trip_gaussian_levels *l)
 static double voxel_width(const trip_gaussian_levels *l, unsigned depth)
 {
     return ldexp(l->p.octree->side, -(int)depth);
+}
+
+/* Copies a Gaussian that has only the coefficients up to the degree. */
+static void copy_gaussian(const trip_gaussian_levels *l, trip_gaussian *to, const trip_gaussian *g)
+{
+    memcpy(to, g,
+           offsetof(trip_gaussian, sh) + (size_t)trip_sh_count(l->p.degree) * sizeof g->sh[0]);
+}
+
+/* ---- the workers ---- */
+
+static size_t chunks_of(size_t count)
+{
+    return (count + CHUNK - 1) / CHUNK;
+}
+
+static int do_chunk(void *user, unsigned thread, uint64_t item)
+{
+    trip_gaussian_levels *l = user;
+    const bool finds = item < l->next_chunks;
+    const size_t first = CHUNK * (size_t)(finds ? item : item - l->next_chunks);
+    const size_t count = finds ? l->next_count : l->sent_count;
+    (void)thread;
+    for (size_t i = first; i < count && i < first + CHUNK; i++)
+        if (finds)
+            trip_gaussian_moments_of((const void *)(l->next + i * l->stride), l->p.degree,
+                                     &l->coming[i]);
+        else if (l->sent[i].merged)
+            l->sent[i].g = trip_gaussian_moments_merge(&l->sent[i].moments, l->p.degree);
+    return TRIP_OK;
+}
+
+/* Waits for the loop, and emits the Gaussians that it merged. */
+static int end_loop(trip_gaussian_levels *l)
+{
+    int status = TRIP_OK;
+    if (!l->running)
+        return TRIP_OK;
+    l->running = false;
+    trip_workers_wait(l->p.workers, 0, &status);
+    for (size_t i = 0; i < l->sent_count && status == TRIP_OK; i++)
+        status = l->p.emit(l->p.user, l->sent[i].node, &l->sent[i].g);
+    l->sent_count = 0;
+    return status;
+}
+
+/* Starts a loop for the queue and the next Gaussians. */
+static int start_loop(trip_gaussian_levels *l, const unsigned char *next, size_t count)
+{
+    waiting *sent = l->filling;
+    const int status = end_loop(l);
+    if (status < 0)
+        return status;
+    l->filling = l->sent;
+    l->sent = sent;
+    l->sent_count = l->filled;
+    l->filled = 0;
+    l->next = next;
+    l->next_count = count;
+    l->next_chunks = chunks_of(count);
+    l->running = true;
+    trip_workers_start(l->p.workers, do_chunk, l, l->next_chunks + chunks_of(l->sent_count));
+    return TRIP_OK;
+}
+
+/* Adds a coarse Gaussian of a node to the queue; `moments` NULL means `g` itself. */
+static int add_coarse(trip_gaussian_levels *l, uint64_t node, const trip_gaussian *g,
+                      const trip_gaussian_moments *moments)
+{
+    const int status = l->filled == l->batch ? start_loop(l, NULL, 0) : TRIP_OK;
+    if (status < 0)
+        return status;
+    waiting *to = &l->filling[l->filled++];
+    to->node = node;
+    to->merged = moments != NULL;
+    if (moments)
+        memcpy(&to->moments, moments, trip_gaussian_moments_bytes(l->p.degree));
+    else
+        copy_gaussian(l, &to->g, g);
+    return TRIP_OK;
+}
+
+/* ---- voxels ---- */
+
+/* The first pass only counts. */
+static void add_to_voxel(trip_gaussian_levels *l, unsigned depth, const trip_gaussian *first,
+                         const trip_gaussian_moments *moments)
+{
+    voxel *v = &l->voxels[depth];
+    if (!l->merges) {
+        v->moments.count += moments->count;
+        return;
+    }
+    if (!v->moments.count)
+        copy_gaussian(l, &v->first, first);
+    trip_gaussian_moments_add(&v->moments, moments, l->p.degree);
 }
 
 /* Closes the voxel at a depth: counts or emits it for the nodes around it, and adds it to the voxel
@@ -84,17 +216,11 @@ static int close_voxel(trip_gaussian_levels *l, unsigned depth)
         if (!l->merges) {
             n->counts[k]++;
         } else if (n->records && n->halvings == k) {
-            const trip_gaussian merged =
-                v->moments.count == 1 ? v->first
-                                      : trip_gaussian_moments_merge(&v->moments, l->p.degree);
-            status = l->p.emit(l->p.user, node, &merged);
+            status = add_coarse(l, node, &v->first, v->moments.count == 1 ? NULL : &v->moments);
         }
     }
     if (depth > 0) {
-        voxel *around = &l->voxels[depth - 1];
-        if (!around->moments.count)
-            around->first = v->first;
-        trip_gaussian_moments_add(&around->moments, &v->moments, l->p.degree);
+        add_to_voxel(l, depth - 1, &v->first, &v->moments);
     }
     v->moments.count = 0;
     return status;
@@ -128,15 +254,16 @@ static int keep_whole(trip_gaussian_levels *l, const trip_gaussian *g, int mergi
         for (unsigned k = 1; k <= TRIP_LEVEL_HALVINGS && !l->merges; k++)
             n->counts[k] += (int)(depth + k) > merging;
         if (l->merges && n->records && (int)(depth + n->halvings) > merging)
-            status = l->p.emit(l->p.user, l->path[depth], g);
+            status = add_coarse(l, l->path[depth], g, NULL);
     }
     return status;
 }
 
-int trip_gaussian_levels_add(trip_gaussian_levels *l, const trip_gaussian *g, uint64_t *leaf)
+/* Adds a Gaussian. `own` has its moments; in the first pass only the number, 1. */
+static int add(trip_gaussian_levels *l, const trip_gaussian *g, bool has_mass,
+               const trip_gaussian_moments *own, uint64_t *leaf)
 {
     const trip_octree_place place = trip_octree_place_of(l->p.octree, g->centre);
-    trip_gaussian_moments own;
     int status = l->any ? close_below(l, trip_octree_common(&l->place, &place)) : TRIP_OK;
     *leaf = trip_octree_leaf(l->p.octree, &place, l->path);
     l->any = true;
@@ -146,15 +273,40 @@ int trip_gaussian_levels_add(trip_gaussian_levels *l, const trip_gaussian *g, ui
         l->parts[*leaf].records++;
     if (status < 0 || g->opacity * 255 <= 1)
         return status;
-    trip_gaussian_moments_of(g, l->p.degree, &own);
-    const int merging = own.mass > 0 ? merging_depth(l, g, l->depth + TRIP_LEVEL_HALVINGS - 1) : -1;
-    if (merging >= 0) {
-        voxel *v = &l->voxels[merging];
-        if (!v->moments.count)
-            v->first = *g;
-        trip_gaussian_moments_add(&v->moments, &own, l->p.degree);
-    }
+    const int merging = has_mass ? merging_depth(l, g, l->depth + TRIP_LEVEL_HALVINGS - 1) : -1;
+    if (merging >= 0)
+        add_to_voxel(l, (unsigned)merging, g, own);
     return keep_whole(l, g, merging);
+}
+
+int trip_gaussian_levels_count(trip_gaussian_levels *l, const trip_gaussian *g, uint64_t *leaf)
+{
+    const trip_gaussian_moments one = { .count = 1 };
+    return add(l, g, trip_gaussian_has_mass(g), &one, leaf);
+}
+
+int trip_gaussian_levels_merge(trip_gaussian_levels *l, const unsigned char *splats, size_t stride,
+                               size_t count)
+{
+    l->stride = stride;
+    int status = start_loop(l, splats, count < l->batch ? count : l->batch);
+    for (size_t at = 0, n = 0; at < count && status == TRIP_OK; at += n) {
+        const size_t left = count - at;
+        n = left < l->batch ? left : l->batch;
+        status = end_loop(l);
+        trip_gaussian_moments *own = l->coming;
+        l->coming = l->own;
+        l->own = own;
+        if (status == TRIP_OK)
+            status = start_loop(l, splats + (at + n) * stride,
+                                left - n < l->batch ? left - n : l->batch);
+        for (size_t i = 0; i < n && status == TRIP_OK; i++) {
+            uint64_t leaf;
+            status =
+                add(l, (const void *)(splats + (at + i) * stride), own[i].mass > 0, &own[i], &leaf);
+        }
+    }
+    return status;
 }
 
 /* Selects the voxels of a node and of all nodes inside it. Returns the number of its Gaussians. A
@@ -178,16 +330,37 @@ static uint64_t select_node(trip_gaussian_levels *l, uint64_t node)
     return p->records ? p->records : inside;
 }
 
-int trip_gaussian_levels_end_pass(trip_gaussian_levels *l)
+static int close_all(trip_gaussian_levels *l)
 {
     int status = l->any ? close_below(l, 0) : TRIP_OK;
-    if (status == TRIP_OK)
-        status = close_voxel(l, 0);
     l->any = false;
-    if (!l->merges)
-        select_node(l, 0);
+    return status == TRIP_OK ? close_voxel(l, 0) : status;
+}
+
+bool trip_gaussian_levels_select(trip_gaussian_levels *l)
+{
+    close_all(l);
+    select_node(l, 0);
     l->merges = true;
-    return status;
+    l->batch = 1;
+    const uint64_t most = trip_budget_left_bytes(l->budget) / MEMORY_PART / tables_bytes(l);
+    l->batch = most < BATCH_MIN ? BATCH_MIN : most > BATCH_MAX ? BATCH_MAX : (size_t)most;
+    l->tables = trip_budget_take(l->budget, tables_bytes(l));
+    if (!l->tables)
+        return false;
+    l->filling = l->tables;
+    l->sent = l->filling + l->batch;
+    l->own = (void *)(l->sent + l->batch);
+    l->coming = l->own + l->batch;
+    return true;
+}
+
+int trip_gaussian_levels_end(trip_gaussian_levels *l)
+{
+    int status = close_all(l);
+    if (status == TRIP_OK)
+        status = start_loop(l, NULL, 0);
+    return status == TRIP_OK ? end_loop(l) : status;
 }
 
 uint64_t trip_gaussian_levels_records(const trip_gaussian_levels *l, uint64_t node)

@@ -51,13 +51,24 @@ static void covariance_of(const trip_gaussian *g, double s[6])
         }
 }
 
+/* The deviations are floats, so the product of two positive ones is positive as a double. */
+bool trip_gaussian_has_mass(const trip_gaussian *g)
+{
+    int positive = 0;
+    for (int a = 0; a < 3; a++)
+        positive += g->deviations[a] > 0;
+    return positive >= 2 && (double)g->opacity > ALPHA_MIN;
+}
+
 void trip_gaussian_moments_of(const trip_gaussian *g, int degree, trip_gaussian_moments *out)
 {
     const double deviations[3] = { (double)g->deviations[0], (double)g->deviations[1],
                                    (double)g->deviations[2] };
     const double a = 2 * M_PI * trip_gaussian_mean_area(deviations);
     const double opacity = fmin((double)g->opacity, ALPHA_MAX);
-    *out = (trip_gaussian_moments){ .count = 1, .mass = fmax(0, a * (opacity - ALPHA_MIN)) };
+    memset(out, 0, trip_gaussian_moments_bytes(degree));
+    out->count = 1;
+    out->mass = fmax(0, a * (opacity - ALPHA_MIN));
     if (!(out->mass > 0))
         return;
     out->optical = a * (trip_dilogarithm(opacity) - ALPHA_MIN);
@@ -76,7 +87,7 @@ void trip_gaussian_moments_add(trip_gaussian_moments *to, const trip_gaussian_mo
                                int degree)
 {
     if (!to->count) {
-        *to = *from;
+        memcpy(to, from, trip_gaussian_moments_bytes(degree));
         return;
     }
     const double mass = to->mass + from->mass, both = to->mass * (from->mass / mass);

@@ -25,6 +25,8 @@
 #ifndef TRIP_GAUSSIAN_MOMENTS_H
 #define TRIP_GAUSSIAN_MOMENTS_H
 
+#include <stdbool.h>
+#include <stddef.h>
 #include <stdint.h>
 
 #include "gaussian.h"
@@ -39,6 +41,16 @@ typedef struct trip_gaussian_moments {
     double colours[TRIP_SH_MAX][3]; /* sums of m times coefficient */
 } trip_gaussian_moments;
 
+/* Returns the bytes of moments that have coefficients up to a degree. All functions leave the bytes
+ * behind them alone. */
+static inline size_t trip_gaussian_moments_bytes(int degree)
+{
+    return offsetof(trip_gaussian_moments, colours) +
+           (size_t)trip_sh_count(degree) * 3 * sizeof(double);
+}
+
+/* Returns whether the moments of a Gaussian have a mass above 0. */
+bool trip_gaussian_has_mass(const trip_gaussian *g);
 /* Sets the moments of one Gaussian. Its mass is 0 if drawing leaves it out at any size, or if it
  * has no area from any direction. */
 void trip_gaussian_moments_of(const trip_gaussian *g, int degree, trip_gaussian_moments *out);

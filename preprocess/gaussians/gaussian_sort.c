@@ -9,25 +9,36 @@
 
 enum {
     OUTPUT_BYTES = 1 << 16,
+    WRITE_BYTES = 1 << 15,    /* of the buffer of a run that is spilled */
     READ_BYTES_MIN = 1 << 14, /* of the buffer of a run that is merged */
-    RECORDS_MIN = 1024,       /* of a run */
-    CHECK_EVERY = 1 << 14,    /* splats between two checks for an interruption */
+    READ_BYTES_MAX = 1 << 20,
+    RECORDS_MIN = 1024,    /* of a run */
+    READ_SPLATS = 1024,    /* are read at once */
+    CHECK_EVERY = 1 << 14, /* splats between two checks for an interruption */
 };
 
+/* A run that is merged. It lies in memory, sorted by keys, or in the file of runs. */
 typedef struct run {
-    uint64_t at, end; /* bytes of the file that are not yet in the buffer */
+    const unsigned char *head; /* the next splat; NULL at the end */
     unsigned char *buffer;
+    const trip_key *keys; /* of the splats that are left in memory; NULL for the file */
+    size_t left;
+    uint64_t at, end; /* bytes of the file that are not yet in the buffer */
     size_t next, filled;
 } run;
 
+/* The area has a slice for each run that is sorted at the same time: splats, two tables of keys,
+ * and a buffer if the run is spilled. */
 typedef struct sorter {
     const trip_gaussian_sort_params *p;
     trip_budget *budget;
     size_t stride;
-    unsigned char *area; /* all memory but the outputs' buffers */
-    size_t area_bytes;
-    trip_output file; /* of the runs */
-    uint64_t *ends;   /* of the runs in the file */
+    unsigned char *area;
+    size_t area_bytes, slice_bytes;
+    unsigned slices;   /* 1, or one for each worker */
+    size_t run_splats; /* the most splats of a run */
+    trip_output file;  /* of the runs; closed if all fit into the area */
+    uint64_t *ends;    /* of the runs in the file */
     uint64_t run_count;
 } sorter;
 
@@ -60,74 +71,109 @@ static const trip_gaussian *splat(const unsigned char *spilled)
     return (const void *)(spilled + sizeof(trip_spilled));
 }
 
-/* Reads splats into the area and sorts them by keys behind them. */
-static int sort_run(sorter *s, uint64_t first, size_t count, size_t capacity, trip_key **sorted)
+/* ---- runs ---- */
+
+static size_t run_length(const sorter *s, uint64_t number)
 {
-    trip_key *keys = (void *)(s->area + capacity * s->stride), *scratch = keys + capacity;
-    const int status = trip_output_read(s->p->spool, first * s->stride, s->area, count * s->stride);
-    if (status < 0)
-        return status;
-    for (size_t i = 0; i < count; i++) {
-        unsigned char *spilled = s->area + i * s->stride;
-        s->p->place(s->p->user, splat(spilled), (void *)spilled);
-        keys[i] = (trip_key){ trip_key_of(head(spilled)->at), i };
-    }
-    trip_key_sort(keys, scratch, count);
-    for (size_t i = 0; i < count; i++)
-        keys[i].key = head(s->area + keys[i].number * s->stride)->group;
-    trip_key_sort(keys, scratch, count);
-    *sorted = keys;
-    return check_interrupted(s);
+    const uint64_t left = s->p->records - number * s->run_splats;
+    return left < s->run_splats ? (size_t)left : s->run_splats;
 }
 
-static int emit_run(const sorter *s, const trip_key *keys, size_t count)
+static trip_key *keys_of(const sorter *s, unsigned char *slice)
 {
+    return (void *)(slice + s->run_splats * s->stride);
+}
+
+static void count_groups(const sorter *s, const trip_key *keys, size_t count)
+{
+    for (size_t i = 0, first = 0; i < count; first = i) {
+        while (i < count && keys[i].key == keys[first].key)
+            i++;
+        s->p->count(s->p->user, keys[first].key, i - first);
+    }
+}
+
+/* Reads a run into a slice in parts, and makes keys of the coordinates. */
+static int read_run(const sorter *s, uint64_t number, unsigned char *slice, trip_key *keys)
+{
+    const size_t count = run_length(s, number);
+    const uint64_t at = number * s->run_splats * s->stride;
     int status = TRIP_OK;
-    for (size_t i = 0; i < count && status == TRIP_OK; i++) {
-        status = s->p->emit(s->p->user, s->area + keys[i].number * s->stride);
-        if (status == TRIP_OK && i % CHECK_EVERY == 0)
+    for (size_t i = 0; i < count && status == TRIP_OK;) {
+        const size_t end = count - i < READ_SPLATS ? count : i + READ_SPLATS;
+        unsigned char *spilled = slice + i * s->stride;
+        status = trip_output_read(s->p->spool, at + i * s->stride, spilled, (end - i) * s->stride);
+        for (; i < end && status == TRIP_OK; i++, spilled += s->stride) {
+            s->p->place(s->p->user, splat(spilled), (void *)spilled);
+            keys[i] = (trip_key){ trip_key_of(head(spilled)->at), i };
+        }
+        if (status == TRIP_OK)
             status = check_interrupted(s);
     }
     return status;
 }
 
-static int spill_run(sorter *s, const trip_key *keys, size_t count)
+/* Sorts a run in a slice by keys. */
+static int sort_run(const sorter *s, uint64_t number, unsigned char *slice)
 {
+    const size_t count = run_length(s, number);
+    trip_key *keys = keys_of(s, slice), *scratch = keys + s->run_splats;
+    const int status = read_run(s, number, slice, keys);
+    if (status < 0)
+        return status;
+    trip_key_sort(keys, scratch, count);
+    for (size_t i = 0; i < count; i++)
+        keys[i].key = head(slice + keys[i].number * s->stride)->group;
+    trip_key_sort(keys, scratch, count);
+    if (s->p->count)
+        count_groups(s, keys, count);
+    return check_interrupted(s);
+}
+
+/* Writes a sorted run to its place in the file. */
+static int spill_run(const sorter *s, uint64_t number, unsigned char *slice)
+{
+    const size_t count = run_length(s, number), most = WRITE_BYTES / s->stride;
+    const trip_key *keys = keys_of(s, slice);
+    unsigned char *buffer = slice + s->slice_bytes - WRITE_BYTES;
+    uint64_t at = number * s->run_splats * s->stride;
     int status = TRIP_OK;
-    for (size_t i = 0; i < count && status == TRIP_OK; i++)
-        status = trip_output_append(&s->file, s->area + keys[i].number * s->stride, s->stride);
-    s->ends[s->run_count++] = s->file.bytes;
+    for (size_t i = 0; i < count && status == TRIP_OK;) {
+        size_t n = 0;
+        for (; n < most && i < count; n++, i++)
+            memcpy(buffer + n * s->stride, slice + keys[i].number * s->stride, s->stride);
+        status = trip_output_patch(&s->file, at, buffer, n * s->stride);
+        at += n * s->stride;
+    }
+    s->ends[number] = at;
     return status;
 }
 
-static int create_file(const sorter *s, trip_output *o)
+/* Each worker has a slice. Runs that stay in memory have a slice each. */
+static int make_run(void *user, unsigned thread, uint64_t number)
 {
-    return trip_output_create(o,
-                              &(trip_output_params){ .folder = s->p->folder,
-                                                     .name = TRIP_SPOOL_NAME,
-                                                     .buffer_bytes = OUTPUT_BYTES,
-                                                     .unnamed = true },
-                              s->budget);
+    const sorter *s = user;
+    unsigned char *slice = s->area + (s->ends ? thread : number) * s->slice_bytes;
+    const int status = sort_run(s, number, slice);
+    return status == TRIP_OK && s->ends ? spill_run(s, number, slice) : status;
 }
 
-static int make_runs(sorter *s, size_t capacity)
+static int make_runs(sorter *s)
 {
-    int status = create_file(s, &s->file);
-    for (uint64_t first = 0; first < s->p->records && status == TRIP_OK; first += capacity) {
-        const uint64_t left = s->p->records - first;
-        const size_t count = left < capacity ? (size_t)left : capacity;
-        trip_key *keys;
-        status = sort_run(s, first, count, capacity, &keys);
-        if (status == TRIP_OK)
-            status = spill_run(s, keys, count);
-    }
-    return status == TRIP_OK ? trip_output_flush(&s->file) : status;
+    int status = TRIP_OK;
+    if (s->slices > 1)
+        return trip_workers_run(s->p->workers, make_run, s, s->run_count);
+    for (uint64_t i = 0; i < s->run_count && status == TRIP_OK; i++)
+        status = make_run(s, 0, i);
+    return status;
 }
+
+/* ---- merging ---- */
 
 /* Whether the next splat of run a comes before the next of run b. */
 static bool is_before(const run *a, const run *b)
 {
-    const trip_spilled *x = head(a->buffer + a->next), *y = head(b->buffer + b->next);
+    const trip_spilled *x = head(a->head), *y = head(b->head);
     if (x->group != y->group)
         return x->group < y->group;
     return x->at != y->at ? x->at < y->at : x->number < y->number;
@@ -141,7 +187,21 @@ static int fill(const sorter *s, run *r, size_t room)
     const int status =
         r->filled ? trip_output_read(&s->file, r->at, r->buffer, r->filled) : TRIP_OK;
     r->at += r->filled;
+    r->head = r->filled ? r->buffer : NULL;
+    trip_output_announce_read(&s->file, r->at, r->end - r->at < room ? r->end - r->at : room);
     return status;
+}
+
+static int advance(const sorter *s, run *r, size_t room)
+{
+    if (r->keys) {
+        r->keys++;
+        r->head = --r->left ? r->buffer + r->keys->number * s->stride : NULL;
+        return TRIP_OK;
+    }
+    r->next += s->stride;
+    r->head = r->buffer + r->next;
+    return r->next == r->filled ? fill(s, r, room) : TRIP_OK;
 }
 
 static void sift(run **heap, size_t count, size_t at)
@@ -160,11 +220,33 @@ static void sift(run **heap, size_t count, size_t at)
     }
 }
 
-/* Merges runs first to first + count into `to`, or emits them if `to` is NULL. */
-static int merge(sorter *s, uint64_t first, size_t count, trip_output *to)
+/* Merges open runs into `to`, or emits them if `to` is NULL. */
+static int merge_open(const sorter *s, run **heap, size_t open, size_t room, trip_output *to)
+{
+    int status = TRIP_OK;
+    for (size_t i = open; i > 0; i--)
+        sift(heap, open, i - 1);
+    for (uint64_t n = 0; open > 0 && status == TRIP_OK; n++) {
+        run *r = heap[0];
+        status = to ? trip_output_append(to, r->head, s->stride) : s->p->emit(s->p->user, r->head);
+        if (status == TRIP_OK)
+            status = advance(s, r, room);
+        if (!r->head)
+            heap[0] = heap[--open];
+        sift(heap, open, 0);
+        if (status == TRIP_OK && n % CHECK_EVERY == 0)
+            status = check_interrupted(s);
+    }
+    return status;
+}
+
+/* Merges runs first to first + count of the file. */
+static int merge(const sorter *s, uint64_t first, size_t count, trip_output *to)
 {
     const size_t tables = count * (sizeof(run) + sizeof(run *));
-    const size_t room = (s->area_bytes - tables) / count / s->stride * s->stride;
+    const size_t share = (s->area_bytes - tables) / count;
+    const size_t room =
+        (share < READ_BYTES_MAX ? share : (size_t)READ_BYTES_MAX) / s->stride * s->stride;
     run **heap = (void *)s->area, *runs = (void *)(heap + count);
     unsigned char *buffers = (void *)(runs + count);
     size_t open = 0;
@@ -176,22 +258,17 @@ static int merge(sorter *s, uint64_t first, size_t count, trip_output *to)
         if (runs[i].filled)
             heap[open++] = &runs[i];
     }
-    for (size_t i = open; i > 0; i--)
-        sift(heap, open, i - 1);
-    for (uint64_t n = 0; open > 0 && status == TRIP_OK; n++) {
-        run *r = heap[0];
-        const unsigned char *next = r->buffer + r->next;
-        status = to ? trip_output_append(to, next, s->stride) : s->p->emit(s->p->user, next);
-        r->next += s->stride;
-        if (status == TRIP_OK && r->next == r->filled)
-            status = fill(s, r, room);
-        if (!r->filled)
-            heap[0] = heap[--open];
-        sift(heap, open, 0);
-        if (status == TRIP_OK && n % CHECK_EVERY == 0)
-            status = check_interrupted(s);
-    }
-    return status;
+    return status == TRIP_OK ? merge_open(s, heap, open, room, to) : status;
+}
+
+static int create_file(const sorter *s, trip_output *o)
+{
+    return trip_output_create(o,
+                              &(trip_output_params){ .folder = s->p->folder,
+                                                     .name = TRIP_SPOOL_NAME,
+                                                     .buffer_bytes = OUTPUT_BYTES,
+                                                     .unnamed = true },
+                              s->budget);
 }
 
 /* Merges groups of runs into longer runs. */
@@ -216,14 +293,20 @@ static int merge_groups(sorter *s, size_t ways)
     return status;
 }
 
-static int sort_externally(sorter *s, size_t capacity)
+static size_t most_ways(const sorter *s)
 {
-    const size_t run_bytes = READ_BYTES_MIN + sizeof(run) + sizeof(run *);
-    const size_t ways = s->area_bytes / run_bytes;
-    const uint64_t runs = (s->p->records + capacity - 1) / capacity;
-    const size_t ends_bytes = runs * sizeof *s->ends;
+    return s->area_bytes / (READ_BYTES_MIN + sizeof(run) + sizeof(run *));
+}
+
+static int sort_externally(sorter *s)
+{
+    const size_t ways = most_ways(s), ends_bytes = s->run_count * sizeof *s->ends;
     s->ends = trip_budget_take(s->budget, ends_bytes);
-    int status = s->ends && ways >= 2 ? make_runs(s, capacity) : fail_memory(s);
+    int status = s->ends && ways >= 2 ? create_file(s, &s->file) : fail_memory(s);
+    if (status == TRIP_OK)
+        status = trip_output_reserve(&s->file, s->p->records * s->stride);
+    if (status == TRIP_OK)
+        status = make_runs(s);
     while (status == TRIP_OK && s->run_count > ways)
         status = merge_groups(s, ways);
     if (status == TRIP_OK)
@@ -233,12 +316,56 @@ static int sort_externally(sorter *s, size_t capacity)
     return status;
 }
 
+/* Sorts one run in each slice. */
 static int sort_in_memory(sorter *s)
 {
-    const size_t count = (size_t)s->p->records;
-    trip_key *keys;
-    const int status = sort_run(s, 0, count, count, &keys);
-    return status == TRIP_OK ? emit_run(s, keys, count) : status;
+    const size_t count = (size_t)s->run_count, bytes = count * (sizeof(run) + sizeof(run *));
+    run *runs = trip_budget_take(s->budget, bytes), **heap = runs ? (void *)(runs + count) : NULL;
+    int status = runs ? TRIP_OK : fail_memory(s);
+    for (size_t i = 0; i < count && status == TRIP_OK; i++)
+        heap[i] = &runs[i];
+    if (status == TRIP_OK)
+        status = make_runs(s);
+    for (size_t i = 0; i < count && status == TRIP_OK; i++) {
+        runs[i] = (run){ .buffer = s->area + i * s->slice_bytes, .left = run_length(s, i) };
+        runs[i].keys = keys_of(s, runs[i].buffer);
+        runs[i].head = runs[i].buffer + runs[i].keys->number * s->stride;
+    }
+    if (status == TRIP_OK)
+        status = merge_open(s, heap, count, 0, NULL);
+    trip_budget_release(s->budget, runs, bytes);
+    return status;
+}
+
+/* ---- sizes ---- */
+
+/* Divides `bytes` of memory into slices. Returns false if they are too small. */
+static bool set_slices(sorter *s, unsigned slices, uint64_t bytes)
+{
+    const size_t each = s->stride + 2 * sizeof(trip_key);
+    s->slices = slices;
+    s->slice_bytes = (size_t)(bytes / slices) & ~(size_t)7;
+    if (s->slice_bytes < WRITE_BYTES + RECORDS_MIN * each)
+        return false;
+    s->run_splats = (s->slice_bytes - WRITE_BYTES) / each;
+    s->area_bytes = slices * s->slice_bytes;
+    s->run_count = (s->p->records + s->run_splats - 1) / s->run_splats;
+    return slices == 1 || s->run_count <= most_ways(s);
+}
+
+/* Returns whether all splats fit into `bytes` of memory. Each slice then has one run. */
+static bool fits_memory(sorter *s, uint64_t bytes)
+{
+    const size_t each = s->stride + 2 * sizeof(trip_key);
+    const unsigned workers = trip_workers_count(s->p->workers);
+    s->slices = s->p->records / RECORDS_MIN >= workers ? workers : 1;
+    if (bytes / each < s->p->records + s->slices)
+        return false;
+    s->run_splats = (size_t)((s->p->records + s->slices - 1) / s->slices);
+    s->run_count = (s->p->records + s->run_splats - 1) / s->run_splats;
+    s->slice_bytes = s->run_splats * each;
+    s->area_bytes = s->slices * s->slice_bytes;
+    return true;
 }
 
 int trip_gaussian_sort(const trip_gaussian_sort_params *params, trip_budget *budget)
@@ -247,20 +374,17 @@ int trip_gaussian_sort(const trip_gaussian_sort_params *params, trip_budget *bud
                  .budget = budget,
                  .stride = trip_spilled_bytes(params->degree),
                  .file = { .fd = -1 } };
-    const size_t each = s.stride + 2 * sizeof(trip_key);
     /* The files of runs and their ends need memory beside the area. */
     const uint64_t left = trip_budget_left_bytes(budget), beside = 4 * OUTPUT_BYTES + left / 16;
-    uint64_t capacity = left > beside ? (left - beside) / each : 0;
-    if (capacity > params->records)
-        capacity = params->records;
-    if (capacity < params->records && capacity < RECORDS_MIN)
+    const uint64_t bytes = left > beside ? left - beside : 0;
+    const bool fits = fits_memory(&s, bytes);
+    if (!fits && !set_slices(&s, trip_workers_count(params->workers), bytes) &&
+        !set_slices(&s, 1, bytes))
         return fail_memory(&s);
-    s.area_bytes = capacity * each;
     s.area = trip_budget_take(budget, s.area_bytes);
     if (!s.area)
         return fail_memory(&s);
-    const int status =
-        capacity == params->records ? sort_in_memory(&s) : sort_externally(&s, (size_t)capacity);
+    const int status = fits ? sort_in_memory(&s) : sort_externally(&s);
     trip_budget_release(budget, s.area, s.area_bytes);
     return status;
 }

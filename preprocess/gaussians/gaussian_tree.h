@@ -31,7 +31,7 @@ typedef struct trip_gaussian_node {
 } trip_gaussian_node;
 
 typedef struct trip_gaussian_leaf {
-    uint64_t records; /* counted by the caller */
+    _Atomic uint64_t records; /* counted by the caller */
     uint64_t group;
 } trip_gaussian_leaf;
 

@@ -361,7 +361,8 @@ static float farthest(const trip_projected *s, float shear, float from, float to
     return shear * dy + sqrtf(fmaxf(0, s->limit - v * v)) / s->across;
 }
 
-/* Narrows an entry of a row to the tiles that the ellipse meets there. */
+/* Narrows an entry of a row to the tiles that the ellipse meets there. It never widens it: a
+ * Gaussian that meets only closed tiles by its span has no entry, so others must keep to theirs. */
 static void narrow(const trip_gaussians_cpu *g, int row, row_entry *entry)
 {
     const trip_projected *s = &g->splats[entry->splat];
@@ -373,12 +374,13 @@ static void narrow(const trip_gaussians_cpu *g, int row, row_entry *entry)
     const double right = s->x + (double)(farthest(s, shear, from, to) + slack);
     const double left = s->x - (double)(farthest(s, -shear, from, to) + slack);
     const trip_pixels x = trip_pixels_within(left, right, g->camera.width);
-    if (x.first > x.last) {
+    const int first = x.first / TRIP_TILE_PX, last = x.last / TRIP_TILE_PX;
+    if (x.first > x.last || first > entry->right || last < entry->left) {
         *entry = (row_entry){ entry->splat, 1, 0 };
         return;
     }
-    entry->left = (uint16_t)(x.first / TRIP_TILE_PX);
-    entry->right = (uint16_t)(x.last / TRIP_TILE_PX);
+    entry->left = (uint16_t)(first > entry->left ? first : entry->left);
+    entry->right = (uint16_t)(last < entry->right ? last : entry->right);
 }
 
 /* Lists the Gaussians of each tile of a row, in their order. */

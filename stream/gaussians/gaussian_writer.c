@@ -25,8 +25,6 @@ struct trip_gaussian_writer {
     trip_file_gaussian_node *nodes;
     trip_gaussian_palette palette;
     uint64_t records[3];
-    unsigned char *codes; /* a brick in all planes */
-    size_t codes_bytes;
 };
 
 /* Returns the bytes of a record in all planes. */
@@ -43,11 +41,6 @@ static int begin(trip_gaussian_writer *w, const trip_gaussian_writer_params *par
     int status = trip_folder_begin(&w->folder, params->path, params->replace);
     if (status < 0)
         return status;
-    w->codes_bytes = TRIP_GAUSSIAN_BRICK_RECORDS_MAX * record_bytes(&w->header);
-    w->codes = trip_budget_take(w->budget, w->codes_bytes);
-    if (!w->codes)
-        return trip_fail(TRIP_ERROR, "brick", params->path,
-                         "no memory for a brick of %zu bytes; raise --memory", w->codes_bytes);
     return trip_output_create(&w->bricks,
                               &(trip_output_params){ .folder = w->folder.partial,
                                                      .name = TRIP_SPOOL_NAME,
@@ -84,6 +77,11 @@ int trip_gaussian_writer_open(trip_gaussian_writer **out, const trip_gaussian_wr
 const char *trip_gaussian_writer_folder(const trip_gaussian_writer *w)
 {
     return w->folder.partial;
+}
+
+size_t trip_gaussian_writer_codes_bytes(const trip_gaussian_writer *w)
+{
+    return TRIP_GAUSSIAN_BRICK_RECORDS_MAX * record_bytes(&w->header);
 }
 
 static unsigned plane_count(const trip_gaussian_writer *w)
@@ -181,23 +179,32 @@ static void widen_nodes(trip_gaussian_writer *w)
     }
 }
 
-int trip_gaussian_writer_append(trip_gaussian_writer *w, int axis, uint64_t node, int size_class,
-                                const unsigned char *const *splats, unsigned count)
+void trip_gaussian_writer_encode(const trip_gaussian_writer *w, int size_class,
+                                 const unsigned char *const *splats, unsigned count,
+                                 trip_file_gaussian_brick *brick, unsigned char *codes)
 {
-    unsigned char *planes[TRIP_GAUSSIAN_PLANES] = { w->codes };
-    trip_file_gaussian_brick b = { .first_record = w->records[axis], .size_class = size_class };
-    int status = axis == w->axis ? TRIP_OK : open_planes(w, axis);
+    unsigned char *planes[TRIP_GAUSSIAN_PLANES] = { codes };
+    *brick = (trip_file_gaussian_brick){ .size_class = size_class };
     for (unsigned n = 1; n < plane_count(w); n++)
-        planes[n] = planes[n - 1] + (size_t)TRIP_GAUSSIAN_BRICK_RECORDS_MAX *
-                                        trip_gaussian_plane_bytes(&w->header, n - 1);
+        planes[n] = planes[n - 1] + (size_t)count * trip_gaussian_plane_bytes(&w->header, n - 1);
     if (w->palette.entries)
         write_entries(w, splats, count, planes[1]);
-    trip_gaussian_encode(&b, &w->header, splats, count, planes);
-    for (unsigned n = 0; n < plane_count(w) && status == TRIP_OK; n++)
-        status = trip_output_append(&w->planes[n], planes[n],
-                                    count * (size_t)trip_gaussian_plane_bytes(&w->header, n));
+    trip_gaussian_encode(brick, &w->header, splats, count, planes);
+}
+
+int trip_gaussian_writer_append(trip_gaussian_writer *w, int axis, uint64_t node,
+                                const trip_file_gaussian_brick *brick, const unsigned char *codes)
+{
+    trip_file_gaussian_brick b = *brick;
+    int status = axis == w->axis ? TRIP_OK : open_planes(w, axis);
+    for (unsigned n = 0; n < plane_count(w) && status == TRIP_OK; n++) {
+        const size_t bytes = b.records * (size_t)trip_gaussian_plane_bytes(&w->header, n);
+        status = trip_output_append(&w->planes[n], codes, bytes);
+        codes += bytes;
+    }
+    b.first_record = w->records[axis];
     include(&w->header, &b);
-    w->records[axis] += count;
+    w->records[axis] += b.records;
     add_to_node(&w->header, &w->nodes[node], axis, &b);
     w->header.brick_count[axis]++;
     return status == TRIP_OK ? trip_output_append(&w->bricks, &b, sizeof b) : status;
@@ -295,8 +302,6 @@ void trip_gaussian_writer_close(trip_gaussian_writer *w)
     for (unsigned n = 0; n < TRIP_GAUSSIAN_PLANES; n++)
         trip_output_close(&w->planes[n]);
     trip_output_close(&w->bricks);
-    if (w->codes)
-        trip_budget_release(w->budget, w->codes, w->codes_bytes);
     trip_folder_close(&w->folder);
     free(w);
 }

@@ -38,10 +38,16 @@ void trip_gaussian_writer_set_palette(trip_gaussian_writer *w,
 /* Gives the nodes, which the writer completes with their bricks. They must outlive the writer. */
 void trip_gaussian_writer_set_nodes(trip_gaussian_writer *w, trip_file_gaussian_node *nodes,
                                     uint64_t count);
-/* Appends a brick to a list. Its records are in order; see trip_gaussian_encode(). Axes ascend from
- * call to call, and nodes ascend along an axis. */
-int trip_gaussian_writer_append(trip_gaussian_writer *w, int axis, uint64_t node, int size_class,
-                                const unsigned char *const *splats, unsigned count);
+/* Returns the bytes of a brick in all planes, at most. */
+size_t trip_gaussian_writer_codes_bytes(const trip_gaussian_writer *w);
+/* Encodes a brick into `codes`, for trip_gaussian_writer_append(). Its records are in order; see
+ * trip_gaussian_encode(). Any thread, even while another appends a brick. */
+void trip_gaussian_writer_encode(const trip_gaussian_writer *w, int size_class,
+                                 const unsigned char *const *splats, unsigned count,
+                                 trip_file_gaussian_brick *brick, unsigned char *codes);
+/* Appends a brick to a list. Axes ascend from call to call, and nodes ascend along an axis. */
+int trip_gaussian_writer_append(trip_gaussian_writer *w, int axis, uint64_t node,
+                                const trip_file_gaussian_brick *brick, const unsigned char *codes);
 /* Writes the index and gives the folder its name. The header gets the `typical` bounds. */
 int trip_gaussian_writer_finish(trip_gaussian_writer *w, const double typical_lo[3],
                                 const double typical_hi[3]);

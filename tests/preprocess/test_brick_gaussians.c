@@ -32,6 +32,8 @@ typedef struct scene {
     trip_scope *scope;
     bool palette;   /* otherwise harmonics are stored whole */
     uint64_t alike; /* so many splats have the same harmonics; 0 means 1 */
+    double step;    /* centres are multiples of it; 0 means any centres */
+    unsigned threads;
 } scene;
 
 #define TAG 0.01
@@ -57,6 +59,8 @@ static trip_gaussian make_splat(const scene *s, uint64_t i)
     g.centre[0] = TAG * (double)place_of(s, i) + s->shift;
     g.centre[1] = 100 * random_of(&state) + s->shift;
     g.centre[2] = 30 * random_of(&state) * random_of(&state) + s->shift;
+    for (int a = 0; a < 3 && s->step > 0; a++)
+        g.centre[a] = s->step * floor(g.centre[a] / s->step);
     for (int a = 0; a < 3; a++)
         g.deviations[a] = (float)exp(-6 + 5 * random_of(&state));
     if (i % 7 == 0)
@@ -106,6 +110,7 @@ static int brick(scene *s, const char *path, uint64_t memory, uint64_t *peak)
                                         .harmonics = s->palette ? TRIP_BRICK_HARMONICS_PALETTE
                                                                 : TRIP_BRICK_HARMONICS_WHOLE,
                                         .flags = TRIP_GAUSSIAN_Y_DOWN,
+                                        .threads = s->threads,
                                         .text = "{\"source\": \"made by numbers\"}" },
         budget, NULL);
     if (peak)
@@ -459,6 +464,26 @@ static void little_memory_suffices_and_gives_the_same_bytes(void **state)
     assert_true(peak <= 14 * MIB);
     assert_int_equal(brick(&s, OTHER, 100 * MIB, NULL), TRIP_OK);
     assert_same_files(NAME, OTHER, 4);
+}
+
+static void threads_and_equal_centres_do_not_change_the_bytes(void **state)
+{
+    (void)state;
+    static const struct {
+        uint64_t memory;
+        unsigned threads;
+    } others[] = {
+        { 4 * MIB, 1 }, { 20 * MIB, 2 }, { 40 * MIB, 3 }, { 40 * MIB, 200 }, { 400 * MIB, 5 }
+    };
+    scene s = { .count = 200000, .degree = 1, .strays = 8, .step = 2, .threads = 1 };
+    assert_int_equal(brick(&s, OTHER, 400 * MIB, NULL), TRIP_OK);
+    for (size_t i = 0; i < sizeof others / sizeof *others; i++) {
+        uint64_t peak;
+        s.threads = others[i].threads;
+        assert_int_equal(brick(&s, NAME, others[i].memory, &peak), TRIP_OK);
+        assert_true(peak <= others[i].memory);
+        assert_same_files(NAME, OTHER, 7);
+    }
 }
 
 static void strays_do_no_harm(void **state)
@@ -890,6 +915,7 @@ int main(void)
         cmocka_unit_test(all_splats_at_one_place_keep_their_order),
         cmocka_unit_test(a_stream_takes_the_memory_that_its_plan_tells),
         cmocka_unit_test(little_memory_suffices_and_gives_the_same_bytes),
+        cmocka_unit_test(threads_and_equal_centres_do_not_change_the_bytes),
         cmocka_unit_test(strays_do_no_harm),
         cmocka_unit_test(bricks_are_compact_and_full),
         cmocka_unit_test(splats_that_reach_into_a_view_are_not_left_out),

@@ -191,6 +191,31 @@ static void invisible_gaussians_have_no_mass(void **state)
     assert_true(m.mass == 0);
 }
 
+static void two_positive_deviations_and_an_opacity_give_mass(void **state)
+{
+    (void)state;
+    static const struct {
+        float deviations[3], opacity;
+        bool has_mass;
+    } cases[] = {
+        { { 1, 1, 1 }, 0.0039f, false },
+        { { 1, 1, 1 }, 0.00393f, true },
+        { { 0, 0, 0 }, 1, false },
+        { { 0, 2, 0 }, 1, false },
+        { { 1e-45f, 0, 3e38f }, 0.5f, true },
+        { { 0, 1e-45f, 1e-45f }, 1, true },
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        trip_gaussian g = ball(0, 0, 0, 1, 1);
+        trip_gaussian_moments m;
+        memcpy(g.deviations, cases[i].deviations, sizeof g.deviations);
+        g.opacity = cases[i].opacity;
+        trip_gaussian_moments_of(&g, 0, &m);
+        assert_int_equal(trip_gaussian_has_mass(&g), cases[i].has_mass);
+        assert_int_equal(m.mass > 0, cases[i].has_mass);
+    }
+}
+
 /* ---- levels of a bricked scene ---- */
 
 /* Thin balls in a box of 64 * 32 * 16, and large ones among them. */
@@ -388,6 +413,7 @@ int main(void)
         cmocka_unit_test(opaque_gaussians_behind_one_another_cover_no_more_than_their_disc),
         cmocka_unit_test(areas_and_dilogarithms_have_their_known_values),
         cmocka_unit_test(invisible_gaussians_have_no_mass),
+        cmocka_unit_test(two_positive_deviations_and_an_opacity_give_mass),
         cmocka_unit_test(each_level_has_fewer_gaussians_down_to_a_few_thousand),
         cmocka_unit_test(each_gaussian_is_drawn_once_at_any_distance),
         cmocka_unit_test(coarse_gaussians_cover_the_area_of_thin_ones),
