@@ -1,6 +1,7 @@
 /* The CPU renderer of Gaussian scenes: closed forms, the same bits in all circumstances, and the
  * reference renderer. */
 #include "cpu/kernels/isa.h"
+#include "gaussian_footprint.h"
 #include "gaussians_cpu.h"
 #include "gaussians_reference.h"
 #include "pool_runner.h"
@@ -268,6 +269,46 @@ static void batches_change_no_bit(void **state)
     expect_same((way){ .batch = 700 });
 }
 
+/* Moves a Gaussian until its footprint ends just left of a pixel centre. */
+static void end_before(trip_gaussian *g, const trip_camera *c, const trip_gaussian_settings *s,
+                       double pixel_centre)
+{
+    const double wanted = pixel_centre - 1e-8;
+    for (int step = 0; step < 60; step++) {
+        trip_gaussian_footprint f = { 0 };
+        assert_true(trip_gaussian_footprint_of(c, s, g, &f));
+        g->centre[0] -= (wanted - f.hi[0]) / 10; /* 10 px per unit, and x goes left */
+    }
+}
+
+/* Rounding lets the first pixel behind a footprint have an alpha of 1/255. Its tile may not take
+ * it: drawn alone, a Gaussian is left out if the tiles of its footprint are closed. */
+static void footprints_keep_to_their_tiles(void **state)
+{
+    (void)state;
+    enum { ENDING = 400, WALL = 3 };
+    static trip_gaussian scene[WALL + ENDING];
+    const trip_camera c = camera_of(9);
+    const trip_gaussian_settings s = { .background = { 0, 0, 0, 1 } };
+    /* Pixels within 30.83 px of x = 17.17 px get three times an alpha above 0.9536. This closes the
+     * columns up to 47.5 px, and with them the first three tiles of each row. */
+    for (int i = 0; i < WALL; i++) {
+        scene[i] = round_at(5.783, 0, 5, 10, 1);
+        scene[i].deviations[1] = 1000;
+        scene[i].deviations[2] = 0;
+    }
+    for (int i = 0; i < ENDING; i++) {
+        trip_gaussian *g = &scene[WALL + i];
+        *g = round_at(3, 8 * test_random() - 4, 9, 0.4 + 0.2 * test_random(),
+                      0.2 + 0.7 * test_random());
+        colour(g, 1, 1, 1);
+        end_before(g, &c, &s, 48.5);
+    }
+    draw(&one, &c, &s, scene, WALL + ENDING, (way){ 0 });
+    draw(&other, &c, &s, scene, WALL + ENDING, (way){ .batch = 1 });
+    assert_memory_equal(one.rgba, other.rgba, sizeof one.rgba);
+}
+
 static void memory_changes_no_bit(void **state)
 {
     (void)state;
@@ -441,6 +482,7 @@ int main(void)
         cmocka_unit_test(closed_tiles_are_told_and_take_nothing),
         cmocka_unit_test(threads_change_no_bit),
         cmocka_unit_test(batches_change_no_bit),
+        cmocka_unit_test(footprints_keep_to_their_tiles),
         cmocka_unit_test(memory_changes_no_bit),
         cmocka_unit_test(instruction_sets_change_no_bit),
         cmocka_unit_test(too_little_memory_is_refused_in_a_line),
