@@ -44,12 +44,13 @@ struct trip_gaussian_frame {
     layer layers[LAYERS_MAX];
     unsigned layer_count, drawn; /* layers; those that are complete */
     source sources[WAYS];
-    unsigned source_count;  /* of the layer that is drawn; 0 until its streams are open */
-    uint64_t planned, seen; /* Gaussians in the streams of this layer; those drawn */
-    trip_gaussian *batch;   /* in order, of all sources */
-    double stop;            /* the order by depth pauses at this key */
-    bool paused;            /* the next Gaussian has a key from `stop` on */
-    float *picture;         /* of one layer, with distances behind it; NULL for one layer */
+    unsigned source_count;       /* of the layer that is drawn; 0 until its streams are open */
+    uint64_t planned, seen;      /* Gaussians in the streams of this layer; those drawn */
+    trip_gaussian *batch;        /* in order, of all sources */
+    double stop;                 /* the order by depth pauses at this key */
+    bool paused;                 /* the next Gaussian has a key from `stop` on */
+    float *picture;              /* of one layer, with distances behind it; NULL for one layer */
+    trip_gaussian_progress read; /* for complete layers */
     trip_gaussian_frame_stats stats;
 };
 
@@ -142,6 +143,11 @@ static int take_layer(const layer *l, float *rgba, float *depth)
     return 0;
 }
 
+static bool may_change(const void *cpu, const double lo[3], const double hi[3], double deviation)
+{
+    return trip_gaussians_cpu_needs_box(cpu, lo, hi, deviation);
+}
+
 /* ---- streams ---- */
 
 static int open_stream(trip_gaussian_frame *f, const trip_gaussian_stream_params *params)
@@ -153,7 +159,6 @@ static int open_stream(trip_gaussian_frame *f, const trip_gaussian_stream_params
     if (status)
         return status;
     const trip_gaussian_plan *plan = trip_placed_stream_planned(*out);
-    f->stats.bricks += plan->bricks;
     f->planned += plan->records;
     f->stats.planned += plan->records;
     f->stats.coarse += plan->coarse_records;
@@ -176,6 +181,7 @@ static int open_streams(trip_gaussian_frame *f, const layer *l)
         .plane_count = trip_gaussian_planes_of(c, planes),
         .lod = trip_gaussian_lod_of(c, f->params.lod_px),
         .degree = f->params.settings.degree,
+        .need = { l->cpu ? may_change : NULL, l->cpu },
     };
     f->source_count = 0;
     f->planned = f->seen = 0;
@@ -362,6 +368,20 @@ int trip_gaussian_frame_begin(trip_gaussian_frame **out, const trip_gaussian_fra
     return status;
 }
 
+/* Returns what the streams have read, for all layers so far. */
+static trip_gaussian_progress read_by(const trip_gaussian_frame *f)
+{
+    trip_gaussian_progress sum = f->read;
+    for (unsigned i = 0; i < f->source_count; i++) {
+        const trip_gaussian_progress one = trip_placed_stream_progress(f->sources[i].stream);
+        sum.bricks += one.bricks;
+        sum.records += one.records;
+        sum.bytes += one.bytes;
+        sum.unneeded_records += one.unneeded_records;
+    }
+    return sum;
+}
+
 /* Two streams of a layer plan some bricks twice, and may leave out some of their Gaussians. */
 static double share_done(const trip_gaussian_frame *f)
 {
@@ -369,7 +389,8 @@ static double share_done(const trip_gaussian_frame *f)
     for (unsigned i = 0; i < f->params.set_count; i++)
         all += (double)f->params.sets[i].set->header.records;
     const double planned = fmin((double)f->planned, all);
-    const double part = planned > 0 ? fmin((double)f->seen / planned, 1) : 0;
+    const double seen = (double)(f->seen + read_by(f).unneeded_records - f->read.unneeded_records);
+    const double part = planned > 0 ? fmin(seen / planned, 1) : 0;
     return (f->drawn + part) / f->layer_count;
 }
 
@@ -393,8 +414,7 @@ static int draw_batch(trip_gaussian_frame *f)
     f->stats.done = share_done(f);
     if (status || count || f->paused)
         return status;
-    for (unsigned i = 0; i < f->source_count; i++)
-        f->stats.bytes_read += trip_placed_stream_planned(f->sources[i].stream)->read_bytes;
+    f->read = read_by(f);
     close_streams(f);
     f->drawn++;
     f->planned = f->seen = 0;
@@ -484,7 +504,15 @@ int trip_gaussian_frame_picture(trip_gaussian_frame *f, float *rgba, float *dept
 
 trip_gaussian_frame_stats trip_gaussian_frame_get_stats(const trip_gaussian_frame *f)
 {
-    return f->integral ? stats_of_integral(f) : f->sheets ? stats_of_sheets(f) : f->stats;
+    if (f->integral)
+        return stats_of_integral(f);
+    if (f->sheets)
+        return stats_of_sheets(f);
+    trip_gaussian_frame_stats stats = f->stats;
+    const trip_gaussian_progress read = read_by(f);
+    stats.bricks = read.bricks;
+    stats.bytes_read = read.bytes;
+    return stats;
 }
 
 void trip_gaussian_frame_end(trip_gaussian_frame *f)

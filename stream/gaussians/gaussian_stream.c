@@ -56,6 +56,7 @@ struct trip_gaussian_stream {
     trip_gaussian_stream_params params;
     trip_budget *budget;
     trip_gaussian_plan plan;
+    trip_gaussian_progress progress;
     steps steps;
     int degree;
     unsigned plane_count;
@@ -395,12 +396,21 @@ static void set_memory(trip_gaussian_stream *s)
         release_chunk(s, (int64_t)i - 1);
 }
 
+static bool is_needed(const trip_gaussian_stream *s, const trip_file_gaussian_brick *b)
+{
+    const trip_gaussian_need *need = &s->params.need;
+    return !need->is_needed || need->is_needed(need->context, b->centre_lo, b->centre_hi,
+                                               exp((double)b->log_hi) * (1 + 1e-6));
+}
+
 /* Asks the system to read a brick soon. */
 static void read_ahead(const trip_gaussian_stream *s, uint64_t i)
 {
     if (i >= s->steps.count)
         return;
     const trip_file_gaussian_brick *b = &s->list->bricks[s->steps.sorted[i].brick];
+    if (!is_needed(s, b))
+        return;
     for (unsigned n = 0; n < s->plane_count; n++) {
         const off_t record = (off_t)trip_gaussian_plane_bytes(&s->set->header, n);
         posix_fadvise(s->list->fd[n], (off_t)b->first_record * record, (off_t)b->records * record,
@@ -456,6 +466,11 @@ int trip_gaussian_stream_open(trip_gaussian_stream **out, const trip_gaussian_se
 const trip_gaussian_plan *trip_gaussian_stream_planned(const trip_gaussian_stream *s)
 {
     return &s->plan;
+}
+
+trip_gaussian_progress trip_gaussian_stream_progress(const trip_gaussian_stream *s)
+{
+    return s->progress;
 }
 
 void trip_gaussian_stream_close(trip_gaussian_stream *s)
@@ -519,8 +534,16 @@ static int read_step(trip_gaussian_stream *s, uint64_t i)
     const double lead = lead_of(&s->params, b);
     int status = TRIP_OK;
     read_ahead(s, i + READ_AHEAD);
-    for (unsigned n = 0; n < s->plane_count && status == TRIP_OK; n++)
+    if (!is_needed(s, b)) {
+        s->progress.unneeded_records += b->records;
+        return TRIP_OK;
+    }
+    for (unsigned n = 0; n < s->plane_count && status == TRIP_OK; n++) {
         status = trip_gaussian_set_read(s->set, s->params.axis, brick, n, s->planes[n]);
+        s->progress.bytes += (uint64_t)b->records * trip_gaussian_plane_bytes(&s->set->header, n);
+    }
+    s->progress.bricks++;
+    s->progress.records += b->records;
     for (uint32_t j = 0; j < b->records && status == TRIP_OK; j++) {
         double centre[3];
         trip_gaussian_decode_centre(b, s->planes[0] + (size_t)j * TRIP_GAUSSIAN_RECORD_BYTES,

@@ -40,6 +40,14 @@ typedef struct trip_gaussian_lod {
     double px;
 } trip_gaussian_lod;
 
+/* Returns whether a brick may still change the picture. All its centres lie in the box, and its
+ * deviations are at most `deviation`. A brick that is not needed once must not be needed later. */
+typedef struct trip_gaussian_need {
+    bool (*is_needed)(const void *context, const double lo[3], const double hi[3],
+                      double deviation); /* NULL: all bricks are needed */
+    const void *context;
+} trip_gaussian_need;
+
 /* Zero means the default. */
 typedef struct trip_gaussian_stream_params {
     int axis; /* of the list that is read: 0, 1, 2 */
@@ -54,6 +62,7 @@ typedef struct trip_gaussian_stream_params {
     trip_gaussian_key spread;
     const trip_gaussian_plane *planes; /* at most TRIP_GAUSSIAN_PLANES_MAX */
     unsigned plane_count;
+    trip_gaussian_need need; /* asked just before a brick is read; others are left out */
     trip_gaussian_lod lod;
     int degree; /* of the spherical harmonics to read; above the scene's means the scene's */
 } trip_gaussian_stream_params;
@@ -101,6 +110,12 @@ typedef struct trip_gaussian_plan {
     uint64_t read_bytes; /* from the disk */
 } trip_gaussian_plan;
 
+/* What a stream has read. Its plan has at least these numbers. */
+typedef struct trip_gaussian_progress {
+    uint64_t bricks, records, bytes;
+    uint64_t unneeded_records; /* in bricks that were not needed */
+} trip_gaussian_progress;
+
 /* Sets *plan. Takes 96 bytes a brick from the budget meanwhile. */
 int trip_gaussian_stream_plan(const trip_gaussian_set *set,
                               const trip_gaussian_stream_params *params, trip_budget *budget,
@@ -114,6 +129,7 @@ int trip_gaussian_stream_open(trip_gaussian_stream **out, const trip_gaussian_se
 int trip_gaussian_stream_next(trip_gaussian_stream *s, trip_gaussian *out, double *keys,
                               size_t room, size_t *got);
 const trip_gaussian_plan *trip_gaussian_stream_planned(const trip_gaussian_stream *s);
+trip_gaussian_progress trip_gaussian_stream_progress(const trip_gaussian_stream *s);
 void trip_gaussian_stream_close(trip_gaussian_stream *s);
 
 #endif

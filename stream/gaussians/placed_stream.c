@@ -16,6 +16,8 @@ typedef struct part {
     trip_gaussian_stream_params params;
     trip_gaussian_plane planes[TRIP_GAUSSIAN_PLANES_MAX]; /* in the set's space */
     double lo, hi;                                        /* bounds of the keys */
+    const trip_gaussian_transform *placement;
+    trip_gaussian_need need; /* in the common space */
     trip_gaussian_plan plan;
     trip_gaussian_stream *stream; /* NULL until the merge reaches `lo`, and after the end */
     trip_gaussian *batch;         /* with the keys behind it */
@@ -31,7 +33,8 @@ struct trip_placed_stream {
     unsigned count, opened;
     part **heap; /* open parts; the first has the least key */
     unsigned heap_count;
-    size_t bytes; /* of parts and heap */
+    size_t bytes;                    /* of parts and heap */
+    trip_gaussian_progress progress; /* of closed parts */
     trip_gaussian_plan plan;
 };
 
@@ -70,6 +73,33 @@ static void place_lod(trip_gaussian_lod *lod, const trip_gaussian_transform *t)
         lod->px *= t->scale;
 }
 
+/* Asks about a box that holds the placed box. */
+static bool is_placed_needed(const void *context, const double lo[3], const double hi[3],
+                             double deviation)
+{
+    const part *p = context;
+    const trip_gaussian_transform *t = p->placement;
+    double from[3], to[3];
+    for (int i = 0; i < 3; i++) {
+        double middle = t->m[i][3], half = 0;
+        for (int k = 0; k < 3; k++) {
+            middle += t->m[i][k] * (lo[k] + hi[k]) / 2;
+            half += fabs(t->m[i][k]) * (hi[k] - lo[k]) / 2;
+        }
+        half += 1e-14 * (fabs(middle) + fabs(t->m[i][3]) + half); /* for rounding */
+        from[i] = middle - half;
+        to[i] = middle + half;
+    }
+    return p->need.is_needed(p->need.context, from, to, deviation * t->scale * (1 + 1e-6));
+}
+
+/* Parts have moved since place_params(). */
+static void place_need(part *p)
+{
+    if (p->need.is_needed && !p->placement->identity)
+        p->params.need = (trip_gaussian_need){ is_placed_needed, p };
+}
+
 static void place_params(part *p, const trip_gaussian_transform *t,
                          const trip_gaussian_stream_params *from)
 {
@@ -81,6 +111,8 @@ static void place_params(part *p, const trip_gaussian_transform *t,
         p->planes[i].reach = t->identity ? plane->reach : plane->reach * t->scale;
     }
     p->params.planes = p->planes;
+    p->placement = t;
+    p->need = from->need;
     place_lod(&p->params.lod, t);
     /* The list whose order is nearest to the order along the common axis. */
     const double *row = t->m[from->axis];
@@ -181,6 +213,7 @@ static int open_alone(trip_placed_stream *s, const trip_gaussian_stream_params *
 {
     part *p = s->parts;
     place_params(p, &s->sets->placement, params);
+    place_need(p);
     const int status = trip_gaussian_stream_open(&p->stream, s->sets->set, &p->params, s->budget);
     s->count = s->opened = 1;
     if (!status)
@@ -215,8 +248,28 @@ const trip_gaussian_plan *trip_placed_stream_planned(const trip_placed_stream *s
     return &s->plan;
 }
 
-static void close_part(const trip_placed_stream *s, part *p)
+static void add_progress(trip_gaussian_progress *sum, const part *p)
 {
+    if (!p->stream)
+        return;
+    const trip_gaussian_progress one = trip_gaussian_stream_progress(p->stream);
+    sum->bricks += one.bricks;
+    sum->records += one.records;
+    sum->bytes += one.bytes;
+    sum->unneeded_records += one.unneeded_records;
+}
+
+trip_gaussian_progress trip_placed_stream_progress(const trip_placed_stream *s)
+{
+    trip_gaussian_progress sum = s->progress;
+    for (unsigned i = 0; i < s->opened; i++)
+        add_progress(&sum, &s->parts[i]);
+    return sum;
+}
+
+static void close_part(trip_placed_stream *s, part *p)
+{
+    add_progress(&s->progress, p);
     trip_gaussian_stream_close(p->stream);
     trip_budget_release(s->budget, p->batch, BATCH_BYTES);
     p->stream = NULL;
@@ -290,6 +343,7 @@ static int open_part(trip_placed_stream *s)
     part *p = &s->parts[s->opened++];
     const trip_gaussian_set *set = s->sets[p->number].set;
     p->params.planes = p->planes;
+    place_need(p);
     int status = trip_gaussian_stream_open(&p->stream, set, &p->params, s->budget);
     if (status)
         return status;

@@ -29,6 +29,8 @@ int trip_placed_stream_next(trip_placed_stream *s, trip_gaussian *out, double *k
                             size_t *got);
 /* The sums over the sets. Windows and memory count the sets that are open together. */
 const trip_gaussian_plan *trip_placed_stream_planned(const trip_placed_stream *s);
+/* The sums over the sets. */
+trip_gaussian_progress trip_placed_stream_progress(const trip_placed_stream *s);
 void trip_placed_stream_close(trip_placed_stream *s); /* NULL is allowed */
 
 #endif
