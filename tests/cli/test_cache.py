@@ -534,12 +534,14 @@ class Cache(program.ProgramTest):
         run = program.start("render", "cloud.nrrd", "-o", "x.png", "--size", "1500x1500",
                             "--renderer", "reference")
         self.addCleanup(run.kill)
-        def held():
+        def held():  # opened and locked
             folder = f"/proc/{run.pid}/fd"
             for fd in os.listdir(folder):
                 try:
                     if drawn in os.readlink(os.path.join(folder, fd)):
-                        return True
+                        with open(f"/proc/{run.pid}/fdinfo/{fd}", encoding="ascii") as info:
+                            if "lock:" in info.read():
+                                return True
                 except FileNotFoundError:
                     pass  # closed since it was listed
             return False

@@ -172,6 +172,23 @@ class Gaussians(program.ProgramTest):
                                      "--early-termination", given)[16, 16, 3]
                 self.assertAlmostEqual(1 - alpha, left, delta=0.06 * left + 2e-7, msg=(renderer, given))
 
+    def test_what_is_hidden_is_not_read(self):
+        """A wall closes all pixels. The picture is that of the wall, and bricks behind it stay unread."""
+        wall = [row((x, y, 3 + z / 100), (1, 0.5, 0), 0.99, (1, 1, 0.01)) for x in range(-4, 5)
+                for y in range(-4, 5) for z in range(4)]
+        behind = many(100000)
+        alone, both = self.scene("wall", wall), self.scene("walled", [*wall, *behind])
+        views = view_of((0, 0, 8), size=(60, 40), up=(0, 1, 0), fov=30), \
+            view_of((0, 0, 8), size=(60, 40), up=(0, 1, 0), ortho_height=3)
+        for view in views:
+            for options in ((), ("--order", "lists"), *(("--renderer", gl) for gl in program.GL)):
+                one, two = (self.picture(d, *options_of(view), "--lod", "0", *options) for d in (alone, both))
+                self.assertLess(255 * numpy.abs(one - two).max(), 0.5, options)
+            read, whole = (self.stats(both, *options_of(view), "--lod", "0", "--renderer", r)["frames"][0]
+                           for r in ("cpu", "reference"))
+            self.assertLess(4 * read["bytes_read"], whole["bytes_read"])
+            self.assertLess(4 * read["gaussians"], whole["gaussians"])
+
     def test_the_renderers_agree_in_both_orders(self):
         data = self.scene("both", many(3000, degree=1), 1)
         for order in "depth", "lists":
