@@ -361,8 +361,8 @@ static float farthest(const trip_projected *s, float shear, float from, float to
     return shear * dy + sqrtf(fmaxf(0, s->limit - v * v)) / s->across;
 }
 
-/* Narrows an entry of a row to the tiles that the ellipse meets there. It never widens it: a
- * Gaussian that meets only closed tiles by its span has no entry, so others must keep to theirs. */
+/* Narrows an entry of a row to the tiles that the ellipse meets there. The
+ * entry never grows: a Gaussian whose span meets only closed tiles has no entry at all. */
 static void narrow(const trip_gaussians_cpu *g, int row, row_entry *entry)
 {
     const trip_projected *s = &g->splats[entry->splat];
