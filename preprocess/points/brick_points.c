@@ -289,16 +289,17 @@ static size_t rows_bytes(const bricker *b)
 
 static int prepare_tiles(bricker *b)
 {
+    int status = trip_workers_create(&b->workers, b->p->threads);
     const trip_point_tiles_params params = { .spool = &b->spool,
+                                             .workers = b->workers,
                                              .records = b->records,
                                              .sample = &b->sample,
                                              .folder = b->folder,
                                              .name = b->p->path,
                                              .progress = note_sorted,
                                              .user = b };
-    int status = trip_point_tiles_make(&b->tiles, &params, b->budget);
     if (status == 0)
-        status = trip_workers_create(&b->workers, b->p->threads);
+        status = trip_point_tiles_make(&b->tiles, &params, b->budget);
     if (status < 0)
         return status;
     b->rooms = TILES_PER_THREAD * trip_workers_count(b->workers);
@@ -434,6 +435,7 @@ static int brick_surfels(bricker *b, trip_brick_gaussians_result *result)
             .flags = p->flags | TRIP_GAUSSIAN_FLAT | TRIP_GAUSSIAN_CLOUD |
                      (p->colouring == TRIP_POINT_BY_RGB ? 0 : TRIP_GAUSSIAN_SHADED),
             .text = p->text,
+            .threads = p->threads,
             .progress = tell,
             .progress_user = b },
         b->budget, result);

@@ -1,6 +1,7 @@
 #include "point_tiles.h"
 
 #include <math.h>
+#include <stdatomic.h>
 #include <pthread.h>
 #include <stdlib.h>
 #include <string.h>
@@ -117,10 +118,15 @@ static int add_row(void *user, const unsigned char *spilled)
 
 static void place_row(void *user, const trip_gaussian *row, trip_spilled *head)
 {
-    trip_point_tiles *t = user;
+    const trip_point_tiles *t = user;
     head->group = trip_gaussian_tree_leaf(&t->tree, row->centre, 0);
     head->at = row->centre[0];
-    t->tree.leaves[head->group].records++;
+}
+
+static void count_rows(void *user, uint64_t leaf, uint64_t rows)
+{
+    trip_point_tiles *t = user;
+    atomic_fetch_add_explicit(&t->tree.leaves[leaf].records, rows, memory_order_relaxed);
 }
 
 static int sort(trip_point_tiles *t)
@@ -141,8 +147,10 @@ static int sort(trip_point_tiles *t)
     if (!t->tiles)
         return fail_memory(t);
     status = trip_gaussian_sort(&(trip_gaussian_sort_params){ .spool = p->spool,
+                                                              .workers = p->workers,
                                                               .records = p->records,
                                                               .place = place_row,
+                                                              .count = count_rows,
                                                               .folder = p->folder,
                                                               .path = p->name,
                                                               .emit = add_row,

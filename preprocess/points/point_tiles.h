@@ -39,6 +39,7 @@ typedef struct trip_point_tiles trip_point_tiles;
 
 typedef struct trip_point_tiles_params {
     const trip_output *spool; /* of trip_point_row, flushed */
+    trip_workers *workers;    /* no loop runs */
     uint64_t records;
     const trip_gaussian_sample *sample; /* of the positions, all of group 0 */
     const char *folder;                 /* for temporary files */

@@ -55,10 +55,16 @@ static void make_tiles(cloud *c, uint64_t memory)
             memcpy(sample.points[sample.count++].centre, c->points[i], sizeof row.position);
     }
     assert_int_equal(trip_output_flush(&c->spool), 0);
-    const trip_point_tiles_params params = {
-        .spool = &c->spool, .records = c->count, .sample = &sample, .folder = ".", .name = "cloud"
-    };
+    trip_workers *workers;
+    assert_int_equal(trip_workers_create(&workers, 2), 0);
+    const trip_point_tiles_params params = { .spool = &c->spool,
+                                             .workers = workers,
+                                             .records = c->count,
+                                             .sample = &sample,
+                                             .folder = ".",
+                                             .name = "cloud" };
     assert_int_equal(trip_point_tiles_make(&c->tiles, &params, c->budget), 0);
+    trip_workers_destroy(workers);
     free(sample.points);
 }
 
