@@ -89,7 +89,7 @@ static int check_members(const reading *r, const cJSON *of, const char *const *n
     return status;
 }
 
-/* Reads an array of numbers. Leaves `out` as it is if the member is absent. */
+/* Reads an array of numbers. An absent member does not change `out`. */
 static int get_numbers(const reading *r, const cJSON *of, const char *name, int count, double *out)
 {
     const cJSON *array = cJSON_GetObjectItemCaseSensitive(of, name);

@@ -23,30 +23,9 @@ static const trip_gaussian_reader *const readers[] = {
     &trip_read_ksplat,
 };
 
-bool trip_gaussian_suffix(const char *path, const char *suffix)
-{
-    size_t stem = strlen(path);
-    const size_t n = strlen(suffix);
-    if (stem > 3 && strcasecmp(path + stem - 3, ".gz") == 0)
-        stem -= 3;
-    else if (stem > 4 && strcasecmp(path + stem - 4, ".bz2") == 0)
-        stem -= 4;
-    return stem > n && strncasecmp(path + stem - n, suffix, n) == 0;
-}
-
 int trip_gaussian_no_memory(const trip_gaussian_file *f)
 {
     return trip_fail(TRIP_ERROR, "read", f->path, "out of memory");
-}
-
-int trip_gaussian_check_plain(const trip_gaussian_file *f)
-{
-    const char *program = trip_byte_encoding_name(trip_byte_encoding_of(f->path));
-    return *program ? trip_fail(TRIP_ERROR, "read", f->path,
-                                "is compressed with %s, and its format (%s) can only be read "
-                                "unpacked: unpack it first, with `%s -dc FILE >NAME`",
-                                program, f->info.format, program)
-                    : 0;
 }
 
 /* Sets *out to the reader of a file, or to NULL. */

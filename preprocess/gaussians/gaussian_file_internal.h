@@ -44,12 +44,6 @@ struct trip_ply_header;
 /* Sets the parts of f->info that comments of a PLY tell: trainer, antialiasing and axis. */
 void trip_ply_describe(const struct trip_ply_header *h, trip_gaussian_file *f);
 
-/* Returns whether a file name ends in a suffix, also before ".gz" or ".bz2". */
-bool trip_gaussian_suffix(const char *path, const char *suffix);
-
-/* Fails for a compressed file, of a format that is read in parts or by its size. */
-int trip_gaussian_check_plain(const trip_gaussian_file *f);
-
 /* Reports that memory is exhausted. */
 int trip_gaussian_no_memory(const trip_gaussian_file *f);
 

@@ -18,7 +18,7 @@ typedef struct trip_octree_node {
     unsigned depth;
 } trip_octree_node;
 
-/* The place of a centre. Bit 51 tells the half of the whole cube, bit 50 the half of that half. */
+/* The place of a centre. Bit 51 is 1 in the upper half of the cube. Each lower bit halves again. */
 typedef struct trip_octree_place {
     uint64_t at[3];
 } trip_octree_place;

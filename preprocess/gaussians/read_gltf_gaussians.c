@@ -9,6 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "byte_stream.h"
 #include "gaussian_transform.h"
 #include "gltf_file.h"
 #include "report.h"
@@ -266,7 +267,7 @@ static int open_gltf(trip_gaussian_file *f)
     if (!s || !(s->parts = calloc(PARTS_MAX, sizeof(part *))))
         return trip_gaussian_no_memory(f);
     f->info.format = "glTF";
-    int status = trip_gaussian_check_plain(f);
+    int status = trip_byte_stream_refuse_compressed(f->path, f->info.format);
     if (status == 0)
         status = trip_gltf_open(&s->file, f->path);
     if (status < 0)

@@ -46,7 +46,7 @@ typedef struct ksplat {
 
 static bool probe(const trip_gaussian_head *head)
 {
-    return trip_gaussian_suffix(head->path, ".ksplat") && head->count > 0;
+    return trip_byte_suffix(head->path, ".ksplat") && head->count > 0;
 }
 
 /* Reads all `bytes` bytes at a place of the file. */
@@ -148,7 +148,7 @@ static int open_ksplat(trip_gaussian_file *f)
         return trip_gaussian_no_memory(f);
     k->fd = -1;
     f->info.format = ".ksplat";
-    int status = trip_gaussian_check_plain(f);
+    int status = trip_byte_stream_refuse_compressed(f->path, f->info.format);
     if (status == 0)
         status = trip_file_size(f->path, &k->file_bytes);
     if (status < 0)

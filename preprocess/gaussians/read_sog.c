@@ -16,6 +16,7 @@
 #include <unzip.h>
 #include <webp/decode.h>
 
+#include "byte_stream.h"
 #include "json.h"
 #include "read_at.h"
 #include "report.h"
@@ -64,7 +65,7 @@ static bool probe(const trip_gaussian_head *head)
         return false;
     if (memcmp(head->bytes, "PK\3\4", 4) != 0)
         return is_folder_meta(head);
-    return trip_gaussian_suffix(head->path, ".sog") ||
+    return trip_byte_suffix(head->path, ".sog") ||
            memmem(head->bytes, head->count, "means_l.webp", 12);
 }
 
@@ -337,7 +338,7 @@ static int open_sog(trip_gaussian_file *f)
     if (!s)
         return trip_gaussian_no_memory(f);
     f->info.format = "SOG";
-    int status = trip_gaussian_check_plain(f);
+    int status = trip_byte_stream_refuse_compressed(f->path, f->info.format);
     if (status == 0)
         status = trip_budget_create(&s->budget, 0);
     if (status < 0)

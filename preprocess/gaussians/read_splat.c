@@ -19,7 +19,7 @@ typedef struct splat {
 
 static bool probe(const trip_gaussian_head *head)
 {
-    return trip_gaussian_suffix(head->path, ".splat") && head->count > 0;
+    return trip_byte_suffix(head->path, ".splat") && head->count > 0;
 }
 
 static int open_splat(trip_gaussian_file *f)
@@ -29,7 +29,7 @@ static int open_splat(trip_gaussian_file *f)
     if (!s)
         return trip_gaussian_no_memory(f);
     f->info.format = ".splat";
-    int status = trip_gaussian_check_plain(f);
+    int status = trip_byte_stream_refuse_compressed(f->path, f->info.format);
     if (status == 0)
         status = trip_file_size(f->path, &bytes);
     if (status < 0)

@@ -155,7 +155,7 @@ static int open_packed(trip_gaussian_file *f, spz *s, int fd)
 
 static int open_version_4(trip_gaussian_file *f, spz *s)
 {
-    int status = trip_gaussian_check_plain(f);
+    int status = trip_byte_stream_refuse_compressed(f->path, f->info.format);
     if (status < 0)
         return status;
     const int fd = open(f->path, O_RDONLY | O_CLOEXEC);

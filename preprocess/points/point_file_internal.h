@@ -63,12 +63,6 @@ enum { TRIP_POINT_SCANS_MAX = 1 << 16 };
 /* Adds a zeroed scan to the info. Returns it, or NULL after a reported failure. */
 trip_point_scan *trip_point_add_scan(trip_point_file *f);
 
-/* Returns whether a file name ends in a suffix, also before ".gz" or ".bz2". */
-bool trip_point_suffix(const char *path, const char *suffix);
-
-/* Fails for a compressed file, of a format that is read in parts. */
-int trip_point_check_plain(const trip_point_file *f);
-
 /* Reports that memory is exhausted. */
 int trip_point_no_memory(const trip_point_file *f);
 

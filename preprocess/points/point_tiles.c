@@ -34,7 +34,7 @@ typedef struct near_tile {
     uint64_t tile;
 } near_tile;
 
-/* Lists the tiles whose bounds are at most a distance away from the bounds of a tile. */
+/* Lists the tiles near a tile: the bounds of both are at most a distance apart. */
 typedef struct near_tiles {
     bool known;
     uint64_t of;

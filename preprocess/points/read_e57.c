@@ -9,6 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "byte_stream.h"
 #include "e57_pages.h"
 #include "e57_text.h"
 #include "little_endian.h"
@@ -170,7 +171,7 @@ static int open_e57(trip_point_file *f)
     e57 *e = f->state = calloc(1, sizeof *e);
     if (!e)
         return trip_point_no_memory(f);
-    int status = trip_point_check_plain(f);
+    int status = trip_byte_stream_refuse_compressed(f->path, f->info.format);
     if (status == 0)
         status = trip_e57_pages_open(&e->pages, f->path);
     if (status == 0)

@@ -316,7 +316,7 @@ static int open_las(trip_point_file *f)
 {
     unsigned char header[HEADER_4_BYTES] = { 0 };
     snprintf(f->info.format, sizeof f->info.format, "LAS");
-    int status = trip_point_check_plain(f);
+    int status = trip_byte_stream_refuse_compressed(f->path, f->info.format);
     las *s = f->state = calloc(1, sizeof *s);
     if (!s)
         return trip_point_no_memory(f);

@@ -313,7 +313,7 @@ static int open_compressed(trip_point_file *f)
     pcd *p = f->state;
     unsigned char sizes[8];
     uint64_t file_bytes = 0;
-    int status = trip_point_check_plain(f);
+    int status = trip_byte_stream_refuse_compressed(f->path, f->info.format);
     if (status == 0)
         status = trip_file_size(f->path, &file_bytes);
     if (status < 0)

@@ -11,6 +11,7 @@
 #include <string.h>
 #include <strings.h>
 
+#include "byte_stream.h"
 #include "point_fields.h"
 #include "report.h"
 #include "text_lines.h"
@@ -114,7 +115,7 @@ static probed look_at_head(const trip_point_head *head)
 
 static bool probe_pts(const trip_point_head *head)
 {
-    return trip_point_suffix(head->path, ".pts") && look_at_head(head).rows > 0;
+    return trip_byte_suffix(head->path, ".pts") && look_at_head(head).rows > 0;
 }
 
 /* Text files are clouds if their names say so, if names of columns do, or if every line holds three
@@ -124,10 +125,10 @@ static bool probe_xyz(const trip_point_head *head)
     static const char *const sure[] = { ".xyz", ".asc", ".xyzrgb", ".xyzn", ".xyzi" };
     const probed p = look_at_head(head);
     for (size_t i = 0; i < sizeof sure / sizeof *sure; i++)
-        if (trip_point_suffix(head->path, sure[i]))
+        if (trip_byte_suffix(head->path, sure[i]))
             return p.rows > 0; /* the reader names the line of a fault */
-    return p.good && ((trip_point_suffix(head->path, ".txt") && (p.names || p.rows >= 3)) ||
-                      (trip_point_suffix(head->path, ".csv") && p.names));
+    return p.good && ((trip_byte_suffix(head->path, ".txt") && (p.names || p.rows >= 3)) ||
+                      (trip_byte_suffix(head->path, ".csv") && p.names));
 }
 
 /* ---- columns ---- */

@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "byte_stream.h"
 #include "vdb/module.h"
 
 typedef struct vdb {
@@ -30,7 +31,7 @@ static int open_vdb(trip_point_file *f)
     vdb *v = f->state = calloc(1, sizeof *v);
     if (!v)
         return trip_point_no_memory(f);
-    int status = trip_point_check_plain(f);
+    int status = trip_byte_stream_refuse_compressed(f->path, f->info.format);
     if (status == 0)
         status = trip_vdb_load_module(&readers);
     if (status < 0)

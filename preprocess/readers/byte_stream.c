@@ -74,6 +74,27 @@ const char *trip_byte_encoding_name(trip_byte_encoding encoding)
     return encoding == TRIP_BYTES_ZLIB ? "gzip" : encoding == TRIP_BYTES_BZIP2 ? "bzip2" : "";
 }
 
+bool trip_byte_suffix(const char *path, const char *suffix)
+{
+    size_t stem = strlen(path);
+    const size_t n = strlen(suffix);
+    if (stem > 3 && strcasecmp(path + stem - 3, ".gz") == 0)
+        stem -= 3;
+    else if (stem > 4 && strcasecmp(path + stem - 4, ".bz2") == 0)
+        stem -= 4;
+    return stem > n && strncasecmp(path + stem - n, suffix, n) == 0;
+}
+
+int trip_byte_stream_refuse_compressed(const char *path, const char *format)
+{
+    const char *program = trip_byte_encoding_name(trip_byte_encoding_of(path));
+    return *program ? trip_fail(TRIP_ERROR, "read", path,
+                                "is compressed with %s, and its format (%s) can only be read "
+                                "unpacked: unpack it first, with `%s -dc FILE >NAME`",
+                                program, format, program)
+                    : 0;
+}
+
 int trip_byte_stream_refuse_twice(const char *path, trip_byte_encoding whole)
 {
     return trip_fail(TRIP_ERROR, "read", path,

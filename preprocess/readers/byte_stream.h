@@ -58,6 +58,12 @@ trip_byte_encoding trip_byte_encoding_of(const char *path);
 /* Returns "gzip" or "bzip2", or "" for plain files. */
 const char *trip_byte_encoding_name(trip_byte_encoding encoding);
 
+/* Whether a path ends in a suffix such as ".pts", with or without .gz or .bz2 behind it. */
+bool trip_byte_suffix(const char *path, const char *suffix);
+
+/* Reports a compressed file of a format that can only be read unpacked. */
+int trip_byte_stream_refuse_compressed(const char *path, const char *format);
+
 /* Reports that a compressed file holds compressed values. Returns TRIP_ERROR.
  */
 int trip_byte_stream_refuse_twice(const char *path, trip_byte_encoding whole);

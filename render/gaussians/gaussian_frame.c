@@ -368,7 +368,7 @@ int trip_gaussian_frame_begin(trip_gaussian_frame **out, const trip_gaussian_fra
     return status;
 }
 
-/* Returns what the streams have read, for all layers so far. */
+/* Returns the records and bytes read so far, over all layers. */
 static trip_gaussian_progress read_by(const trip_gaussian_frame *f)
 {
     trip_gaussian_progress sum = f->read;

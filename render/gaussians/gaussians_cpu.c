@@ -362,7 +362,7 @@ static float farthest(const trip_projected *s, float shear, float from, float to
 }
 
 /* Narrows an entry of a row to the tiles that the ellipse meets there. The
- * entry never grows: a Gaussian whose span meets only closed tiles has no entry at all. */
+ * entry never grows, since a span of closed tiles alone gives no entry. */
 static void narrow(const trip_gaussians_cpu *g, int row, row_entry *entry)
 {
     const trip_projected *s = &g->splats[entry->splat];

@@ -110,7 +110,7 @@ typedef struct trip_gaussian_plan {
     uint64_t read_bytes; /* from the disk */
 } trip_gaussian_plan;
 
-/* What a stream has read. Its plan has at least these numbers. */
+/* The records and bytes read so far. Its plan has at least these numbers. */
 typedef struct trip_gaussian_progress {
     uint64_t bricks, records, bytes;
     uint64_t unneeded_records; /* in bricks that were not needed */
