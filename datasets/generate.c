@@ -16,12 +16,14 @@
 #include "porous.h"
 #include "report.h"
 #include "text.h"
+#include "tree.h"
 #include "write_vdb.h"
 
 enum { ROWS_PER_TASK = 8, MAX_THREADS = 64, SLICES = 8, PIECE = 256 };
 
 #define POROUS "porous"
 #define LANDSCAPE "landscape"
+#define TREE "tree"
 
 typedef enum sample_type { SAMPLE_U8, SAMPLE_U16, SAMPLE_F32, SAMPLE_DEFAULT } sample_type;
 
@@ -39,7 +41,7 @@ typedef struct job {
     long threads;
     const char *scenes[TRIP_LANDSCAPE_SCENES_MAX]; /* of the landscape */
     int scene_count;
-    uint64_t count; /* Gaussians of the landscape */
+    uint64_t count; /* of the Gaussians or points */
 } job;
 
 /* A part of the volume. Threads take its rows from `next`. */
@@ -206,17 +208,29 @@ static bool is_landscape(const job *j)
     return strcmp(j->name, LANDSCAPE) == 0;
 }
 
-static int generate_landscape(const job *j)
+static bool is_tree(const job *j)
+{
+    return strcmp(j->name, TREE) == 0;
+}
+
+/* Whether the output holds Gaussians or points, not voxels. */
+static bool is_splats(const job *j)
+{
+    return is_landscape(j) || is_tree(j);
+}
+
+static int generate_splats(const job *j)
 {
     if (!ends_with(j->output, ".ply"))
         return trip_fail(TRIP_USAGE, "generate", j->output, "the name must end in .ply");
-    return trip_landscape_write(j->output, j->scenes, j->scene_count, j->count);
+    return is_tree(j) ? trip_tree_write(j->output, j->count)
+                      : trip_landscape_write(j->output, j->scenes, j->scene_count, j->count);
 }
 
 static int generate(job *j)
 {
-    if (is_landscape(j))
-        return generate_landscape(j);
+    if (is_splats(j))
+        return generate_splats(j);
     trip_new_file file;
     bool sparse = ends_with(j->output, ".vdb"), header = ends_with(j->output, ".nrrd");
     if (!sparse && !header && !ends_with(j->output, ".raw"))
@@ -266,10 +280,10 @@ static void parse_argument(job *j, const char *arg, struct argp_state *state)
     if (state->arg_num == 0) {
         j->name = arg;
         j->field = trip_field_find(arg);
-        if (!j->field && strcmp(arg, POROUS) != 0 && !is_landscape(j))
+        if (!j->field && strcmp(arg, POROUS) != 0 && !is_splats(j))
             argp_error(state,
                        "unknown field '%s'; use marschner-lobb, cloud, shells, filaments, " POROUS
-                       " or " LANDSCAPE,
+                       ", " LANDSCAPE " or " TREE,
                        arg);
     } else if (!is_landscape(j)) {
         argp_error(state, "'%s' is one argument too many; only " LANDSCAPE " takes files", arg);
@@ -284,12 +298,12 @@ static void check_together(const job *j, struct argp_state *state)
 {
     if (!j->name || !j->output)
         argp_error(state, "FIELD and -o FILE are required");
-    if (is_landscape(j) && (j->dims[0] || j->type != SAMPLE_DEFAULT || j->detail > 0 || j->threads))
-        argp_error(state, "--size, --type, --detail and --threads do not apply to " LANDSCAPE);
+    if (is_splats(j) && (j->dims[0] || j->type != SAMPLE_DEFAULT || j->detail > 0 || j->threads))
+        argp_error(state, "--size, --type, --detail and --threads do not apply to %s", j->name);
     if (is_landscape(j) && !j->scene_count)
         argp_error(state, LANDSCAPE " needs at least one SCENE");
-    if (!is_landscape(j) && j->count)
-        argp_error(state, "--count applies to " LANDSCAPE " only");
+    if (!is_splats(j) && j->count)
+        argp_error(state, "--count applies to " LANDSCAPE " and " TREE " only");
 }
 
 static error_t parse_option(int key, char *arg, struct argp_state *state)
@@ -340,7 +354,8 @@ static error_t parse_option(int key, char *arg, struct argp_state *state)
 
 static const struct argp_option options[] = {
     { "output", 'o', "FILE", 0, "Writes this file: .nrrd, .raw or .vdb (sparse)", 0 },
-    { "count", 'n', "N", 0, "Sets the number of Gaussians of a landscape (default: 1000000)", 0 },
+    { "count", 'n', "N", 0,
+      "Sets the number of Gaussians of a landscape or points of a tree (default: 1000000)", 0 },
     { "size", 's', "N|NXxNYxNZ", 0,
       "Sets the number of voxels along each axis (default: 256; porous: 1024x1024x300)", 0 },
     { "type", 't', "TYPE", 0,
@@ -381,12 +396,13 @@ int main(int argc, char **argv)
     struct argp argp = {
         options,
         parse_option,
-        "FIELD\nlandscape SCENE...",
+        "FIELD\nlandscape SCENE...\ntree",
         "Writes a volume of a function in closed form. FIELD is marschner-lobb (dense), cloud "
         "(about half empty), shells or filaments (almost empty), or porous. porous is like a CT "
         "scan "
         "of a porous solid: solid 32000, pores 12000, and noise with the standard deviation 900.\n"
-        "landscape writes a PLY file of 3D Gaussians: copies of the SCENEs stand on hills.",
+        "landscape writes a PLY file of 3D Gaussians: copies of the SCENEs stand on hills. "
+        "tree writes a PLY file of points with normals and colours: a tree with leaves.",
         NULL,
         NULL,
         NULL

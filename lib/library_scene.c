@@ -69,8 +69,8 @@ int trip_context_open_scenes(triptych *t, const triptych_object *objects, unsign
 static bool is_shared(const triptych *t, unsigned i)
 {
     bool shared = false;
-    for (unsigned k = 0; k < i; k++)
-        shared |= t->placed[k].set == t->placed[i].set;
+    for (unsigned k = 0; k < i && !shared; k++)
+        shared = t->placed[k].set == t->placed[i].set;
     return shared;
 }
 

@@ -13,7 +13,7 @@
 #include "other_file.h"
 #include "report.h"
 
-enum { BYTES_MAX = 1 << 20 };
+enum { BYTES_MAX = 16 << 20 };
 
 /* A file being read. `object` is the number of the object in hand, from 1; 0 for the file. */
 typedef struct reading {
@@ -55,7 +55,7 @@ static char *read_text(const reading *r)
     if (!f || ferror(f))
         trip_fail_errno("read", r->path, "cannot read");
     else if (got > BYTES_MAX)
-        why = "is larger than 1 MiB; a scene file places at most 1000 objects";
+        why = "is larger than 16 MiB; a scene file places at most 16384 objects";
     else if (memchr(text, 0, got))
         why = "is not JSON: it has a byte 0";
     else
@@ -250,7 +250,7 @@ static int read_objects(reading *r, const cJSON *root, triptych_object **objects
     int status = check_members(r, root, names);
     const int size = cJSON_IsArray(list) ? cJSON_GetArraySize(list) : 0;
     if (!status && (size < 1 || size > TRIPTYCH_OBJECTS_MAX))
-        status = fail(r, " must be a list of 1 to 1000 objects", "objects");
+        status = fail(r, " must be a list of 1 to 16384 objects", "objects");
     if (status)
         return status;
     *objects = calloc((size_t)size, sizeof **objects);

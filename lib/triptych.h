@@ -239,7 +239,7 @@ TRIPTYCH_API int triptych_get_scene(triptych *t, triptych_scene *out);
 
 /* ---- several data sets in one picture ---- */
 
-enum { TRIPTYCH_OBJECTS_MAX = 1000 };
+enum { TRIPTYCH_OBJECTS_MAX = 16384 };
 
 /* A data set and its place in the picture. */
 typedef struct triptych_object {

@@ -155,16 +155,30 @@ static void add_plan(trip_gaussian_plan *sum, const trip_gaussian_plan *p)
     sum->read_bytes += p->read_bytes;
 }
 
-/* Finds the most memory and the largest windows that are open together. */
+static size_t bytes_of(const part *p)
+{
+    return p->plan.bytes + BATCH_BYTES + 4096;
+}
+
+/* Finds the most memory and the largest windows that are open together. The heap holds the parts
+ * that are open at the least key of each part. */
 static void plan_together(trip_placed_stream *s)
 {
+    trip_gaussian_plan together = { 0 };
+    unsigned open = 0;
     for (unsigned i = 0; i < s->count; i++) {
-        trip_gaussian_plan together = { 0 };
-        for (unsigned k = 0; k <= i; k++)
-            if (s->parts[k].hi >= s->parts[i].lo) {
-                together.bytes += s->parts[k].plan.bytes + BATCH_BYTES + 4096;
-                together.window_records += s->parts[k].plan.window_records;
+        unsigned kept = 0;
+        for (unsigned k = 0; k < open; k++)
+            if (s->heap[k]->hi >= s->parts[i].lo) {
+                s->heap[kept++] = s->heap[k];
+            } else {
+                together.bytes -= bytes_of(s->heap[k]);
+                together.window_records -= s->heap[k]->plan.window_records;
             }
+        s->heap[kept] = &s->parts[i];
+        open = kept + 1;
+        together.bytes += bytes_of(&s->parts[i]);
+        together.window_records += s->parts[i].plan.window_records;
         if (together.bytes > s->plan.bytes)
             s->plan.bytes = together.bytes;
         if (together.window_records > s->plan.window_records)

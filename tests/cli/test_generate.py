@@ -78,12 +78,13 @@ def generate(field, dims, path, *arguments):
 
 
 def read_ply(path):
-    """Returns the vertices of a binary PLY file of floats."""
+    """Returns the vertices of a binary PLY file."""
     with open(path, "rb") as f:
         names = []
         while (line := f.readline().strip()) != b"end_header":
             if line.startswith(b"property"):
-                names.append((line.split()[2].decode(), "<f4"))
+                kind, name = line.split()[1:]
+                names.append((name.decode(), {b"float": "<f4", b"uchar": "u1"}[kind]))
         return numpy.frombuffer(f.read(), names)
 
 
@@ -250,6 +251,27 @@ class Generate(program.ProgramTest):
         self.assertTrue(0.699 < scale * width < 1.201, scale * width)
         return scale * width
 
+    def test_points_of_a_tree_lie_evenly_on_its_trunk(self):
+        """The trunk is a cone with radii 0.03 and 0.021 and the height 0.3. Branches begin above."""
+        r = subprocess.run([program.GENERATE, "tree", "-n", "200000", "-o", "tree.ply"],
+                           capture_output=True, text=True)
+        self.assertEqual((r.returncode, r.stdout, r.stderr), (0, "", ""))
+        tree = read_ply("tree.ply")
+        self.assertEqual(len(tree), 200000)
+        at = centres(tree)
+        normals = numpy.stack([tree["n" + n].astype(float) for n in "xyz"], axis=1)
+        numpy.testing.assert_allclose(numpy.linalg.norm(normals, axis=1), 1, atol=1e-5)
+        trunk = at[:, 1] < 0.28
+        self.assertGreater(trunk.sum(), 1000)
+        radius = numpy.hypot(at[trunk, 0], at[trunk, 2])
+        numpy.testing.assert_allclose(radius, 0.03 - 0.03 * at[trunk, 1], atol=1e-6)
+        numpy.testing.assert_allclose((normals * at)[trunk][:, [0, 2]].sum(1), radius, atol=1e-6)
+        low = (at[:, 1] < 0.14).sum() / trunk.sum()
+        share = (0.03 + 0.0258) / (0.03 + 2 * 0.0258 + 0.0216)
+        self.assertLess(abs(low - share), 4 * (share * (1 - share) / trunk.sum()) ** 0.5)
+        leaves = tree["green"] > tree["red"]
+        self.assertTrue(0.5 < leaves.mean() < 0.99)
+
     def test_wrong_landscapes_are_refused(self):
         donut = os.path.join(program.DATASETS, "donut_slice.ply")
         for arguments, says in ((("landscape", "-o", "x.ply"), "at least one SCENE"),
@@ -258,6 +280,9 @@ class Generate(program.ProgramTest):
                                 (("cloud", donut, "-o", "x.raw"), "one argument too many"),
                                 (("cloud", "-n", "5", "-o", "x.raw"), "--count applies"),
                                 (("landscape", donut, "-o", "x.raw"), "must end in .ply"),
+                                (("tree", "-o", "x.raw"), "must end in .ply"),
+                                (("tree", donut, "-o", "x.ply"), "one argument too many"),
+                                (("tree", "-j", "2", "-o", "x.ply"), "do not apply to tree"),
                                 (("landscape", "nowhere.ply", "-o", "x.ply"), "nowhere.ply")):
             r = subprocess.run([program.GENERATE, *arguments], capture_output=True, text=True)
             self.assertIn(r.returncode, (1, 2), arguments)
