@@ -325,7 +325,7 @@ int draw_settings_check(const draw_settings *s, triptych_renderer *renderer, boo
 static const uint64_t of_scenes = ROW(ORDER) | ROW(SHEET) | ROW(HARMONICS);
 static const uint64_t of_both =
     ROW(BACKGROUND) | ROW(CLIP_BOX) | ROW(CLIP_PLANE) | ROW(EARLY_TERMINATION) | ROW(FOOTPRINT) |
-    ROW(SAMPLES) | ROW(DEPTH) | ROW(NORMALISE) | ROW(METHOD) | ROW(H) | ROW(LOD) | ROW(TOLERANCE);
+    ROW(SAMPLES) | ROW(DEPTH) | ROW(NORMALISE) | ROW(METHOD) | ROW(H) | ROW(LOD) | ROW(TOLERANCE) | ROW(SHOW);
 
 static const uint64_t of_clouds = ROW(LIGHT) | ROW(NO_SHADING);
 
@@ -344,6 +344,8 @@ static const struct choice {
       "fixed does not apply to Gaussian scenes" },
     { DRAW_KIND_SCENE, DRAW_METHOD, TRIPTYCH_METHOD_IMAGE - 1,
       "image does not apply to Gaussian scenes" },
+    { DRAW_KIND_SCENE, DRAW_SHOW, TRIPTYCH_SHOW_LEVELS - TRIPTYCH_SHOW_PICTURE,
+      "levels does not apply to Gaussian scenes" },
     { DRAW_KIND_OBJECTS, DRAW_ORDER, TRIPTYCH_ORDER_LISTS - 1, "lists " NOT_OF_OBJECTS },
     { DRAW_KIND_OBJECTS, DRAW_ORDER, TRIPTYCH_ORDER_SHEETS - 1, "sheets " NOT_OF_OBJECTS },
 };
@@ -356,7 +358,7 @@ static bool has_one_layer(const draw_settings *s)
 
 static uint64_t rows_of_kind(const draw_settings *s, int kind)
 {
-    const uint64_t merging = ROW(METHOD) | ROW(H);
+    const uint64_t merging = ROW(METHOD) | ROW(H) | ROW(SHOW);
     const uint64_t own = of_scenes | of_both | (kind == DRAW_KIND_CLOUD ? of_clouds : 0);
     if (kind == DRAW_KIND_OBJECTS) /* the finest level can be asked for */
         return ~not_of_objects | (s->lod.voxel_px == TRIPTYCH_ZERO ? ROW(LOD) : 0);

@@ -5,12 +5,14 @@
 #include <string.h>
 
 #include "clock.h"
+#include "debug_view.h"
 #include "gaussian_footprint.h"
 #include "gaussian_integral.h"
 #include "gaussian_keys.h"
 #include "gaussian_sheet_frame.h"
 #include "gaussians_cpu.h"
 #include "gaussians_reference.h"
+#include "list_colours.h"
 #include "normalise.h"
 #include "renderer.h"
 #include "report.h"
@@ -230,6 +232,8 @@ static int fill(const trip_gaussian_frame *f, source *s)
     for (size_t i = 0; i < s->count; i++)
         compensate(f, &s->batch[i]);
     trip_surfel_light(f->params.settings.light, f->params.camera, s->batch, s->count);
+    if (f->params.by_lists)
+        trip_list_colours(&f->weights, f->layers[f->drawn].axis, s->batch, s->count);
     return status;
 }
 
@@ -332,6 +336,25 @@ static trip_gaussian_frame_stats stats_of_sheets(const trip_gaussian_frame *f)
 
 /* ---- the frame ---- */
 
+/* The weights of the lists need no Gaussians. */
+static bool shows_weights(const trip_gaussian_frame *f)
+{
+    return f->params.by_lists && f->weights.show == TRIP_SHOW_MERGE;
+}
+
+static void fill_with_weights(const trip_gaussian_frame *f, float *rgba)
+{
+    const trip_camera *c = f->params.camera;
+    for (int y = 0; y < c->height; y++)
+        for (int x = 0; x < c->width; x++, rgba += 4) {
+            double rgb[3];
+            trip_debug_view_merge(&f->weights, c, f->axis_of_view, x + 0.5, y + 0.5, rgb);
+            for (int i = 0; i < 3; i++)
+                rgba[i] = (float)rgb[i];
+            rgba[3] = 1;
+        }
+}
+
 static int begin_layers_and_streams(trip_gaussian_frame *f)
 {
     int status = take_memory(f) ? 0
@@ -358,7 +381,8 @@ int trip_gaussian_frame_begin(trip_gaussian_frame **out, const trip_gaussian_fra
     f->axis_of_view = trip_weight_axis_of_view(params->camera);
     if (params->by_lists)
         f->weights = *params->by_lists;
-    const int status = params->integral    ? begin_integral(f)
+    const int status = shows_weights(f)    ? 0
+                       : params->integral  ? begin_integral(f)
                        : params->sheet > 0 ? begin_sheets(f)
                                            : begin_layers_and_streams(f);
     if (!status)
@@ -492,7 +516,9 @@ int trip_gaussian_frame_picture(trip_gaussian_frame *f, float *rgba, float *dept
 {
     const double begun = trip_now_ms();
     int status = 0;
-    if (f->integral)
+    if (shows_weights(f))
+        fill_with_weights(f, rgba);
+    else if (f->integral)
         trip_gaussian_integral_picture(f->integral, rgba);
     else if (f->sheets)
         trip_gaussian_sheet_frame_picture(f->sheets, rgba, depth);

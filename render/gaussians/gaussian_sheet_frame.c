@@ -7,6 +7,7 @@
 #include "gaussian_keys.h"
 #include "gaussian_sheets.h"
 #include "normalise.h"
+#include "list_colours.h"
 #include "surfel_light.h"
 #include "renderer.h"
 #include "weight.h"
@@ -231,6 +232,7 @@ static int draw_batch(trip_gaussian_sheet_frame *f, size_t *got)
     f->stats.read_ms += read - begun;
     f->stats.gaussians += *got;
     trip_surfel_light(f->params.settings.light, f->params.camera, f->batch, *got);
+    trip_list_colours(f->params.weights, f->passes[f->drawn].axis, f->batch, *got);
     if (!status && *got)
         status = trip_gaussian_sheets_add(f->sheets, f->batch, *got);
     f->stats.draw_ms += trip_now_ms() - read;

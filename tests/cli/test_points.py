@@ -56,6 +56,26 @@ class Points(program.ProgramTest):
         """Draws in a parallel view of height 2, along z unless told otherwise."""
         return self.picture(data, *FRAME, "--eye", eye, "--up", up, *options)
 
+    # ---- lists ----
+
+    def test_the_view_of_lists_has_the_shares_of_the_weights(self):
+        """In an opaque wall each list adds its colour times its share. The view of weights has the
+        shares alone."""
+        write_cloud("wall.ply", grid(80) * 2, red=[255] * 6400, green=[255] * 6400, blue=[255] * 6400)
+        view = ("--size", "65x65", "--eye", "2,1.2,2.5", "--look", "0,0,0", "--up", "0,1,0",
+                "--fov", "40", "--order", "lists")
+        for h in "0.5", "0.9":
+            lists = self.picture("wall.ply", *view, "--h", h, "--show", "lists")
+            shares = self.picture("wall.ply", *view, "--h", h, "--show", "merge")
+            self.assertGreater(lists[:, :, 3].min(), 0.95)
+            self.assertLess(abs(lists[:, :, :3] / lists[:, :, 3:] - shares[:, :, :3]).max(), 0.02)
+            self.assertTrue(all(shares[:, :, a].max() > 0.2 for a in (0, 2)))
+        straight = self.front("wall.ply", "--order", "lists", "--show", "merge")
+        numpy.testing.assert_allclose(straight[32, 32], [0, 0, 1, 1], atol=1e-6)
+        for options, says in ((("--show", "lists"), "nothing to merge"),
+                              (("--order", "lists", "--show", "levels"), "levels does not apply")):
+            self.fails(2, "render", "wall.ply", "-o", "x.png", *options, says=says)
+
     # ---- shapes ----
 
     def test_a_point_is_half_opaque_at_its_radius(self):
