@@ -1,6 +1,6 @@
-/* triptych-generate: writes a volume of any size with values from formulas, or a Gaussian scene of
- * any size (landscape.h). It holds only a few slices or one cube at a time, so memory use does not
- * grow with the volume. */
+/* triptych-generate: writes a volume of any size with values from formulas, or a Gaussian scene or
+ * cloud of points of any size (landscape.h). It holds only a few slices or one cube at a time, so
+ * memory use does not grow with the volume. */
 #include <argp.h>
 #include <errno.h>
 #include <pthread.h>
@@ -221,8 +221,11 @@ static bool is_splats(const job *j)
 
 static int generate_splats(const job *j)
 {
+    if (ends_with(j->output, ".las") && !is_tree(j))
+        return trip_cloud_landscape_write(j->output, j->scenes, j->scene_count, j->count);
     if (!ends_with(j->output, ".ply"))
-        return trip_fail(TRIP_USAGE, "generate", j->output, "the name must end in .ply");
+        return trip_fail(TRIP_USAGE, "generate", j->output, "the name must end in .ply%s",
+                         is_tree(j) ? "" : " or .las");
     return is_tree(j) ? trip_tree_write(j->output, j->count)
                       : trip_landscape_write(j->output, j->scenes, j->scene_count, j->count);
 }
@@ -355,7 +358,7 @@ static error_t parse_option(int key, char *arg, struct argp_state *state)
 static const struct argp_option options[] = {
     { "output", 'o', "FILE", 0, "Writes this file: .nrrd, .raw or .vdb (sparse)", 0 },
     { "count", 'n', "N", 0,
-      "Sets the number of Gaussians of a landscape or points of a tree (default: 1000000)", 0 },
+      "Sets the number of Gaussians or points of a landscape or tree (default: 1000000)", 0 },
     { "size", 's', "N|NXxNYxNZ", 0,
       "Sets the number of voxels along each axis (default: 256; porous: 1024x1024x300)", 0 },
     { "type", 't', "TYPE", 0,
@@ -401,8 +404,9 @@ int main(int argc, char **argv)
         "(about half empty), shells or filaments (almost empty), or porous. porous is like a CT "
         "scan "
         "of a porous solid: solid 32000, pores 12000, and noise with the standard deviation 900.\n"
-        "landscape writes a PLY file of 3D Gaussians: copies of the SCENEs stand on hills. "
-        "tree writes a PLY file of points with normals and colours: a tree with leaves.",
+        "landscape writes copies of SCENEs that stand on hills: scenes of 3D Gaussians to a .ply "
+        "file, or clouds of points to a .las file. tree writes a .ply file of points with normals "
+        "and colours: a tree with leaves.",
         NULL,
         NULL,
         NULL

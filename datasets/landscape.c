@@ -1,4 +1,4 @@
-#include "landscape.h"
+#include "landscape_cells.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -13,15 +13,10 @@
 
 enum { FLOATS = 14, BATCH = 4096 };
 
-/* Percentiles bound a scene, since captures have strays far away. */
-#define OUTER 0.02
-
 typedef struct scene {
     trip_gaussian *gaussians;
     uint64_t count;
-    double upright[3][3]; /* turns the scene so that -y points up */
-    double middle[3];     /* upright: the point of the ground below the scene's middle */
-    double width;         /* upright: the greater extent along x and z */
+    trip_upright upright;
 } scene;
 
 typedef struct landscape {
@@ -61,81 +56,21 @@ static int read_scene(const char *path, scene *s, char up[3])
     return status;
 }
 
-/* The rows of the matrix are the axes x, y and z of the landscape. */
-static void find_upright(const char up[3], double m[3][3])
-{
-    const int axis = up[up[0] == '-'] - 'x', other = (axis + 1) % 3;
-    memset(m, 0, 9 * sizeof m[0][0]);
-    m[1][axis] = up[0] == '-' ? 1 : -1;
-    m[2][other] = 1;
-    for (int i = 0; i < 3; i++) /* y x z is x */
-        m[0][i] = m[1][(i + 1) % 3] * m[2][(i + 2) % 3] - m[1][(i + 2) % 3] * m[2][(i + 1) % 3];
-}
-
-static int ascending(const void *a, const void *b)
-{
-    const double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
-static int find_bounds(scene *s, const char *path)
-{
-    const size_t low = (size_t)(OUTER * (double)(s->count - 1)), high = s->count - 1 - low;
-    double *along = malloc(s->count * sizeof *along);
-    if (!along)
-        return trip_fail(TRIP_ERROR, "generate", path, "out of memory");
-    s->width = 0;
-    for (int a = 0; a < 3; a++) {
-        for (uint64_t n = 0; n < s->count; n++) {
-            const double *c = s->gaussians[n].centre, *m = s->upright[a];
-            along[n] = m[0] * c[0] + m[1] * c[1] + m[2] * c[2];
-        }
-        qsort(along, s->count, sizeof *along, ascending);
-        s->middle[a] = a == 1 ? along[high] : (along[low] + along[high]) / 2; /* y points down */
-        if (a != 1)
-            s->width = fmax(s->width, along[high] - along[low]);
-    }
-    free(along);
-    return s->width > 0 ? 0
-                        : trip_fail(TRIP_ERROR, "generate", path,
-                                    "has no width, so that it cannot stand on the ground");
-}
-
 static int add_scene(landscape *l, const char *path)
 {
     char up[3];
     scene *s = &l->scenes[l->scene_count++];
     int status = read_scene(path, s, up);
-    if (!status) {
-        find_upright(up, s->upright);
-        status = find_bounds(s, path);
-    }
-    return status;
+    return status ? status
+                  : trip_upright_find(&s->upright, s->gaussians->centre, sizeof *s->gaussians,
+                                      s->count, up, path);
 }
 
 /* ---- the cells ---- */
 
-static uint64_t hash(uint64_t x)
-{
-    x = (x + 0x9e3779b97f4a7c15) * 0xbf58476d1ce4e5b9;
-    x = (x ^ x >> 27) * 0x94d049bb133111eb;
-    return x ^ x >> 31;
-}
-
-/* Returns a number in [0, 1) that depends on a cell and on the use. */
-static double chance(uint64_t cell, unsigned use)
-{
-    return (double)(hash(cell * 8 + use) >> 11) / (double)(UINT64_C(1) << 53);
-}
-
 static const scene *scene_of(const landscape *l, uint64_t cell)
 {
-    return &l->scenes[hash(cell * 8) % (unsigned)l->scene_count];
-}
-
-double trip_landscape_height(double x, double z)
-{
-    return 0.8 * sin(0.35 * x + 0.6) * cos(0.27 * z) + 0.2 * sin(0.9 * z + 0.4 * x);
+    return &l->scenes[trip_cell_hash(cell * 8) % (unsigned)l->scene_count];
 }
 
 static int flush(landscape *l)
@@ -165,11 +100,9 @@ static int put(landscape *l, const trip_gaussian *g)
 /* One Gaussian of the ground. Its first two axes lie in the surface. */
 static int put_ground(landscape *l, double x, double z, double step)
 {
-    static const double grass[3] = { 0.26, 0.36, 0.14 }, earth[3] = { 0.45, 0.36, 0.25 };
     const double d = 1e-4, h = trip_landscape_height(x, z);
     const double along_x = (trip_landscape_height(x + d, z) - h) / d;
     const double along_z = (trip_landscape_height(x, z + d) - h) / d;
-    const double share = 0.5 + 0.5 * sin(7 * x) * sin(5 * z + h);
     /* The turn of +z, the flat axis, to the normal (-along_x, -1, -along_z) / length. */
     const double length = sqrt(1 + along_x * along_x + along_z * along_z);
     const double n[3] = { -along_x / length, -1 / length, -along_z / length };
@@ -182,9 +115,10 @@ static int put_ground(landscape *l, double x, double z, double step)
     };
     for (int i = 0; i < 4; i++)
         g.rotation[i] = (float)(q[i] / norm);
+    double colour[3];
+    trip_ground_colour(x, z, colour);
     for (int i = 0; i < 3; i++)
-        g.sh[0][i] =
-            (float)((grass[i] + share * (earth[i] - grass[i]) - 0.5) / 0.28209479177387814);
+        g.sh[0][i] = (float)((colour[i] - 0.5) / 0.28209479177387814);
     return put(l, &g);
 }
 
@@ -201,24 +135,8 @@ static int put_grounds(landscape *l, double x0, double z0)
 static int put_copy(landscape *l, uint64_t cell, double x, double z)
 {
     const scene *s = scene_of(l, cell);
-    const double angle = 2 * M_PI * chance(cell, 1);
-    const double scale = (TRIP_LANDSCAPE_SMALLEST +
-                          (TRIP_LANDSCAPE_LARGEST - TRIP_LANDSCAPE_SMALLEST) * chance(cell, 2)) /
-                         s->width;
-    const double turn[3][3] = { { cos(angle), 0, sin(angle) },
-                                { 0, 1, 0 },
-                                { -sin(angle), 0, cos(angle) } };
-    const double at[3] = { x, -trip_landscape_height(x, z), z };
     double m[3][4];
-    for (int i = 0; i < 3; i++) {
-        m[i][3] = at[i];
-        for (int k = 0; k < 3; k++) {
-            m[i][k] = 0;
-            for (int j = 0; j < 3; j++)
-                m[i][k] += scale * turn[i][j] * s->upright[j][k];
-            m[i][3] -= scale * turn[i][k] * s->middle[k];
-        }
-    }
+    trip_cell_transform(cell, x, z, &s->upright, m);
     trip_gaussian_transform t;
     int status = trip_gaussian_transform_make(&t, m)
                      ? 0

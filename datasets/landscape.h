@@ -25,4 +25,21 @@ double trip_landscape_height(double x, double z);
 int trip_landscape_write(const char *output, const char *const *scenes, int scene_count,
                          uint64_t count);
 
+/* A landscape of points, from clouds. The result is a LAS file of version 1.4 with z up, in metres
+ * and millimetres. A point of the landscape at x, y and z, with y down, has these coordinates:
+ *
+ *     TRIP_LANDSCAPE_EAST + U x,   TRIP_LANDSCAPE_NORTH + U z,   -U y,   with U = 100
+ *
+ * The ground of a cell has as many points along a side as the root of a quarter of the points of a
+ * copy, and at least TRIP_LANDSCAPE_GROUND. A hash moves each one within its square. The file has
+ * colours (point format 2) if a cloud has some, and otherwise point format 0. */
+#define TRIP_LANDSCAPE_EAST 500000.0
+#define TRIP_LANDSCAPE_NORTH 4900000.0
+#define TRIP_LANDSCAPE_UNIT 100.0
+#define TRIP_LANDSCAPE_STEP 0.001 /* of the coordinates */
+
+/* Writes exactly `count` points. */
+int trip_cloud_landscape_write(const char *output, const char *const *clouds, int cloud_count,
+                               uint64_t count);
+
 #endif

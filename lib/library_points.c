@@ -1,7 +1,6 @@
 /* Describes and bricks clouds of points for triptych_brick.h. */
 #include "triptych_brick.h"
 
-#include <ctype.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -132,38 +131,10 @@ int trip_context_describe_points_form(const char *path, const triptych_brick_opt
     return fault ? trip_fail(TRIP_USAGE, "brick", path, "%s", fault) : 0;
 }
 
-/* Scans of land and buildings have z up. So do E57, PTS and PTX by convention. */
-static const char *usual_up(const trip_point_info *info)
-{
-    static const char *const z_up[] = { "LAS", "LAZ", "COPC", "E57", "PTS", "PTX", "XYZ" };
-    for (size_t i = 0; i < sizeof z_up / sizeof *z_up; i++)
-        if (!strncmp(info->format, z_up[i], strlen(z_up[i])))
-            return "z";
-    return "y";
-}
-
-/* Sets the axis that a comment of the file names. */
-static void find_stated_up(const trip_point_info *info, char up[3])
-{
-    static const char name[] = "Vertical Axis:";
-    const char *at = strcasestr(info->comments, name);
-    if (!at)
-        return;
-    at += strlen(name);
-    while (*at == ' ')
-        at++;
-    const bool minus = *at == '-';
-    const int axis = tolower((unsigned char)at[minus]);
-    if (axis >= 'x' && axis <= 'z')
-        snprintf(up, 3, "%s%c", minus ? "-" : "", axis);
-}
-
 /* Sets the axis that points up from --axes: the one with the letter S, or I with a minus. */
 static int find_up(const trip_point_info *info, const char *path, const char *axes, char up[3])
 {
-    snprintf(up, 3, "%s", usual_up(info));
-    if (!axes)
-        find_stated_up(info, up);
+    trip_point_up(info, up);
     for (int a = 0; axes && axes[a]; a++)
         if (axes[a] == 'S' || axes[a] == 'I')
             snprintf(up, 3, "%s%c", axes[a] == 'I' ? "-" : "", 'x' + a);

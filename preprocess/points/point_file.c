@@ -1,5 +1,6 @@
 #include "point_file.h"
 
+#include <ctype.h>
 #include <float.h>
 #include <inttypes.h>
 #include <math.h>
@@ -384,4 +385,30 @@ int trip_point_file_survey(trip_point_file *f)
     free(batch);
     free(s);
     return status < 0 ? status : trip_point_file_rewind(f);
+}
+
+/* Scans of land and buildings have z up. So do E57, PTS and PTX by convention. */
+static const char *usual_up(const trip_point_info *info)
+{
+    static const char *const z_up[] = { "LAS", "LAZ", "COPC", "E57", "PTS", "PTX", "XYZ" };
+    for (size_t i = 0; i < sizeof z_up / sizeof *z_up; i++)
+        if (!strncmp(info->format, z_up[i], strlen(z_up[i])))
+            return "z";
+    return "y";
+}
+
+void trip_point_up(const trip_point_info *info, char up[3])
+{
+    static const char name[] = "Vertical Axis:";
+    const char *at = strcasestr(info->comments, name);
+    snprintf(up, 3, "%s", usual_up(info));
+    if (!at)
+        return;
+    at += strlen(name);
+    while (*at == ' ')
+        at++;
+    const bool minus = *at == '-';
+    const int axis = tolower((unsigned char)at[minus]);
+    if (axis >= 'x' && axis <= 'z')
+        snprintf(up, 3, "%s%c", minus ? "-" : "", axis);
 }

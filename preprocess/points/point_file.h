@@ -78,6 +78,10 @@ int trip_point_file_survey(trip_point_file *f);
 int trip_point_file_read(trip_point_file *f, trip_point *out, size_t room, size_t *got_out);
 int trip_point_file_rewind(trip_point_file *f);
 
+/* Sets the axis that points up, such as "z" or "-y": the one that a comment of the file names, or
+ * the usual one of the format. */
+void trip_point_up(const trip_point_info *info, char up[3]);
+
 /* Prints each note of the info with trip_note(). */
 void trip_point_file_print_notes(const trip_point_file *f);
 

@@ -312,7 +312,8 @@ class Reconfigured(program.ProgramTest):
                    if commands["OFF"].get(name) != command}
         self.assertEqual(changed, {
             "common/image_helper.c", "preprocess/readers/read_netcdf4.c", "preprocess/readers/read_vdb.c",
-            "datasets/generate.c", "datasets/landscape.c", "datasets/without/vdb.c",
+            "datasets/generate.c", "datasets/landscape.c", "datasets/landscape_cells.c",
+            "datasets/cloud_landscape.c", "datasets/without/vdb.c",
             "preprocess/points/without/neighbour_tree.c", "render/without/gl.c", "view/without/view.c",
             "serve/without/serve.c", "render/cpu/kernels/isa.c"})
         self.assertGreater(len(commands["ON"]), 300)

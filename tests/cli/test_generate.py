@@ -1,7 +1,9 @@
 """Tests of triptych-generate. Its files hold the values that the test computes from the formulas of
 the fields. Output that cannot be written leaves one line and no file."""
 import os
+import re
 import signal
+import struct
 import subprocess
 import time
 import unittest
@@ -272,6 +274,65 @@ class Generate(program.ProgramTest):
         leaves = tree["green"] > tree["red"]
         self.assertTrue(0.5 < leaves.mean() < 0.99)
 
+    def test_a_landscape_of_clouds_is_las_with_similar_copies(self):
+        """NumPy decodes the records by the LAS specification. The copies are turned about z and scaled,
+        so they keep distances and heights up to the scale. A cloud without colours is black."""
+        lamp = read_ply(os.path.join(program.DATASETS, "lamp.ply"))
+        bare = numpy.random.default_rng(5).normal(size=(900, 3)).round(3)
+        numpy.savetxt("bare.xyz", bare, "%.3f")
+        given = [(centres(lamp), numpy.stack([lamp[n] for n in ("red", "green", "blue")], axis=1)),
+                 (bare, numpy.zeros((900, 3), int))]
+        r = subprocess.run([program.GENERATE, "landscape", os.path.join(program.DATASETS, "lamp.ply"), "bare.xyz",
+                            "-n", "300000", "-o", "land.las"], capture_output=True, text=True)
+        self.assertEqual((r.returncode, r.stdout, r.stderr), (0, "", ""))
+        at, colours, classes = self.decode_las("land.las", 300000)
+        side = int((sum(len(c) for c, _ in given) / 2 / 4) ** 0.5)
+        first, seen = 0, set()
+        while first + side**2 < len(at):
+            ground, first = at[first:first + side**2], first + side**2
+            numpy.testing.assert_allclose(ground[:, 2], 100 * height(*(ground[:, :2] / 100).T), atol=2e-3)
+            self.assertTrue((classes[first - side**2:first] == 2).all())
+            which = int(not colours[first].any())
+            cloud, rgb = given[which]
+            if first + len(cloud) > len(at):
+                break
+            copy = at[first:first + len(cloud)]
+            numpy.testing.assert_array_equal(colours[first:first + len(cloud)], rgb * 257)
+            up = cloud[:, 2] if which else -cloud[:, 1]
+            far = numpy.linalg.norm(cloud - cloud[0], axis=1)
+            away = numpy.linalg.norm(copy - copy[0], axis=1)
+            scale = away[far.argmax()] / far.max()
+            numpy.testing.assert_allclose(away, scale * far, atol=3e-3)
+            numpy.testing.assert_allclose(copy[:, 2] - copy[0, 2], scale * (up - up[0]), atol=3e-3)
+            first += len(cloud)
+            seen.add(which)
+        self.assertEqual(seen, {0, 1})
+
+    def decode_las(self, path, count):
+        """Returns the positions from the corner of the landscape, the colours and the classes."""
+        with open(path, "rb") as f:
+            data = f.read()
+        self.assertEqual((data[:4], data[24], data[25], data[104]), (b"LASF", 1, 4, 2))
+        begin, = struct.unpack_from("<I", data, 96)
+        size, old_count = struct.unpack_from("<HI", data, 105)
+        numbers = struct.unpack_from("<12d", data, 131)
+        new_count, *of_return = struct.unpack_from("<16Q", data, 247)
+        record = numpy.dtype([("at", "<i4", 3), ("intensity", "<u2"), ("returns", "u1"), ("class", "u1"),
+                              ("rest", "u1", 4), ("rgb", "<u2", 3)])
+        self.assertEqual((size, old_count, new_count, len(data)),
+                         (record.itemsize, count, count, begin + size * count))
+        rows = numpy.frombuffer(data, record, offset=begin)
+        at = rows["at"] * numpy.array(numbers[:3]) + numpy.array(numbers[3:6])
+        self.assertEqual(list(numbers[6:]), [f(axis) for axis in at.T for f in (max, min)])
+        number = rows["returns"] & 7
+        self.assertEqual(of_return, [int((number == n).sum()) for n in range(1, 16)])
+        r = subprocess.run([program.PROGRAM, "info", path], capture_output=True, text=True)
+        lines = dict(line.split(None, 1) for line in r.stdout.splitlines())
+        self.assertEqual((lines["format"], lines["points"]), ("LAS 1.4, point format 2", str(count)))
+        shown = [float(n) for n in re.findall(r"-?[0-9.]+", lines["bounds"])]
+        numpy.testing.assert_allclose(shown, [f(axis) for axis in at.T for f in (min, max)], rtol=1e-9)
+        return at - (500000, 4900000, 0), rows["rgb"].astype(int), rows["class"]
+
     def test_wrong_landscapes_are_refused(self):
         donut = os.path.join(program.DATASETS, "donut_slice.ply")
         for arguments, says in ((("landscape", "-o", "x.ply"), "at least one SCENE"),
@@ -283,6 +344,9 @@ class Generate(program.ProgramTest):
                                 (("tree", "-o", "x.raw"), "must end in .ply"),
                                 (("tree", donut, "-o", "x.ply"), "one argument too many"),
                                 (("tree", "-j", "2", "-o", "x.ply"), "do not apply to tree"),
+
+                                (("landscape", donut, "-o", "x.raw"), "must end in .ply or .las"),
+                                (("landscape", "empty.ply", "-o", "x.las"), "empty.ply"),
                                 (("landscape", "nowhere.ply", "-o", "x.ply"), "nowhere.ply")):
             r = subprocess.run([program.GENERATE, *arguments], capture_output=True, text=True)
             self.assertIn(r.returncode, (1, 2), arguments)
