@@ -159,7 +159,7 @@ static int put(landscape *l, const double at[3], const planted *p)
 
 static const cloud *cloud_of(const landscape *l, uint64_t cell)
 {
-    return &l->clouds[trip_cell_hash(cell * 8) % (unsigned)l->cloud_count];
+    return &l->clouds[trip_scatter_hash(cell * 8) % (unsigned)l->cloud_count];
 }
 
 static int put_ground(landscape *l, uint64_t cell, double x0, double z0)
@@ -169,7 +169,7 @@ static int put_ground(landscape *l, uint64_t cell, double x0, double z0)
     planted p = { .returns = 1 | 1 << 3, .classification = GROUND_CLASS };
     int status = 0;
     for (uint64_t i = 0; i < points && l->left > 0 && !status; i++) {
-        const uint64_t moved = trip_cell_hash(cell * points + i);
+        const uint64_t moved = trip_scatter_hash(cell * points + i);
         const double x = x0 + ((double)(i / l->ground) + (double)(moved >> 32) * 0x1p-32) * step;
         const double z =
             z0 + ((double)(i % l->ground) + (double)(moved & UINT32_MAX) * 0x1p-32) * step;

@@ -219,13 +219,20 @@ static bool is_splats(const job *j)
     return is_landscape(j) || is_tree(j);
 }
 
+static bool is_scene_file(const job *j)
+{
+    return is_landscape(j) && ends_with(j->output, ".json");
+}
+
 static int generate_splats(const job *j)
 {
+    if (is_scene_file(j))
+        return trip_scene_landscape_write(j->output, j->scenes, j->scene_count, j->count);
     if (ends_with(j->output, ".las") && !is_tree(j))
         return trip_cloud_landscape_write(j->output, j->scenes, j->scene_count, j->count);
     if (!ends_with(j->output, ".ply"))
         return trip_fail(TRIP_USAGE, "generate", j->output, "the name must end in .ply%s",
-                         is_tree(j) ? "" : " or .las");
+                         is_tree(j) ? "" : ", .las or .json");
     return is_tree(j) ? trip_tree_write(j->output, j->count)
                       : trip_landscape_write(j->output, j->scenes, j->scene_count, j->count);
 }
@@ -358,7 +365,9 @@ static error_t parse_option(int key, char *arg, struct argp_state *state)
 static const struct argp_option options[] = {
     { "output", 'o', "FILE", 0, "Writes this file: .nrrd, .raw or .vdb (sparse)", 0 },
     { "count", 'n', "N", 0,
-      "Sets the number of Gaussians or points of a landscape or tree (default: 1000000)", 0 },
+      "Sets the number of Gaussians or points of a landscape or tree (default: 1000000), or of the "
+      "copies in a scene file (default: 1000)",
+      0 },
     { "size", 's', "N|NXxNYxNZ", 0,
       "Sets the number of voxels along each axis (default: 256; porous: 1024x1024x300)", 0 },
     { "type", 't', "TYPE", 0,
@@ -379,7 +388,7 @@ static void choose_defaults(job *j)
     if (j->threads == 0)
         j->threads = processors < MAX_THREADS ? processors : MAX_THREADS;
     if (j->count == 0)
-        j->count = 1000000;
+        j->count = is_scene_file(j) ? 1000 : 1000000;
     static const long scan[3] = { 1024, 1024, 300 };
     long longest = 0;
     for (int a = 0; a < 3; a++) {
@@ -405,7 +414,8 @@ int main(int argc, char **argv)
         "scan "
         "of a porous solid: solid 32000, pores 12000, and noise with the standard deviation 900.\n"
         "landscape writes copies of SCENEs that stand on hills: scenes of 3D Gaussians to a .ply "
-        "file, or clouds of points to a .las file. tree writes a .ply file of points with normals "
+        "file, clouds of points to a .las file, or places for both to a .json scene file. tree "
+        "writes a .ply file of points with normals "
         "and colours: a tree with leaves.",
         NULL,
         NULL,

@@ -70,7 +70,7 @@ static int add_scene(landscape *l, const char *path)
 
 static const scene *scene_of(const landscape *l, uint64_t cell)
 {
-    return &l->scenes[trip_cell_hash(cell * 8) % (unsigned)l->scene_count];
+    return &l->scenes[trip_scatter_hash(cell * 8) % (unsigned)l->scene_count];
 }
 
 static int flush(landscape *l)

@@ -42,4 +42,11 @@ int trip_landscape_write(const char *output, const char *const *scenes, int scen
 int trip_cloud_landscape_write(const char *output, const char *const *clouds, int cloud_count,
                                uint64_t count);
 
+/* A landscape as a scene file with y up, and a cloud of its ground beside it: NAME-ground.ply. The
+ * scene file places `copies` clouds and Gaussian scenes, which stay where they are. A cell at x, y
+ * and z lies at x, -y and -z. */
+enum { TRIP_LANDSCAPE_COPIES_MAX = 16383 };
+int trip_scene_landscape_write(const char *output, const char *const *scenes, int scene_count,
+                               uint64_t copies);
+
 #endif

@@ -50,16 +50,9 @@ int trip_upright_find(trip_upright *u, const double *centres, size_t stride, uin
                                     "has no width, so that it cannot stand on the ground");
 }
 
-uint64_t trip_cell_hash(uint64_t x)
-{
-    x = (x + 0x9e3779b97f4a7c15) * 0xbf58476d1ce4e5b9;
-    x = (x ^ x >> 27) * 0x94d049bb133111eb;
-    return x ^ x >> 31;
-}
-
 double trip_cell_chance(uint64_t cell, unsigned use)
 {
-    return (double)(trip_cell_hash(cell * 8 + use) >> 11) / (double)(UINT64_C(1) << 53);
+    return (double)(trip_scatter_hash(cell * 8 + use) >> 11) / (double)(UINT64_C(1) << 53);
 }
 
 double trip_landscape_height(double x, double z)

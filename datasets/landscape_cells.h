@@ -6,6 +6,7 @@
 #include <stdint.h>
 
 #include "landscape.h"
+#include "scatter.h"
 
 /* A scene or cloud, turned so that -y points up. */
 typedef struct trip_upright {
@@ -18,7 +19,6 @@ typedef struct trip_upright {
 int trip_upright_find(trip_upright *u, const double *centres, size_t stride, uint64_t count,
                       const char up[3], const char *path);
 
-uint64_t trip_cell_hash(uint64_t x);
 /* Returns a number in [0, 1) that depends on a cell and on the use. */
 double trip_cell_chance(uint64_t cell, unsigned use);
 

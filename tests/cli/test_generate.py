@@ -1,5 +1,6 @@
 """Tests of triptych-generate. Its files hold the values that the test computes from the formulas of
 the fields. Output that cannot be written leaves one line and no file."""
+import json
 import os
 import re
 import signal
@@ -253,6 +254,35 @@ class Generate(program.ProgramTest):
         self.assertTrue(0.699 < scale * width < 1.201, scale * width)
         return scale * width
 
+    def test_a_scene_file_plants_objects_on_a_cloud_of_the_ground(self):
+        """A landscape has y down, and the scene file y up. The two objects stand at the formula's
+        height below their middles, apart from the 2 % that may be strays."""
+        for arguments in ((("tree", "-n", "3000", "-o", "tree.ply")),
+                          ("landscape", "tree.ply", os.path.join(program.DATASETS, "lamp.ply"), "-n",
+                           "20", "-o", "land.json")):
+            r = subprocess.run([program.GENERATE, *arguments], capture_output=True, text=True)
+            self.assertEqual((r.returncode, r.stdout, r.stderr), (0, "", ""))
+        with open("land.json", encoding="utf-8") as f:
+            ground, *objects = json.load(f)["objects"]
+        self.assertEqual(ground, {"data": "land-ground.ply"})
+        self.assertEqual(len(objects), 20)
+        at = read_ply("land-ground.ply")
+        self.assertEqual(len(at), (5 * 16) ** 2)
+        numpy.testing.assert_allclose(at["y"], height(at["x"], -at["z"]), atol=1e-5)
+        tree = centres(read_ply("tree.ply"))
+        planted = [numpy.reshape(o["matrix"], (4, 4)) for o in objects if o["data"].endswith("tree.ply")]
+        self.assertTrue(0 < len(planted) < 20)
+        self.assertTrue(all(o["data"].startswith("/") for o in objects))
+        cut = int(0.02 * (len(tree) - 1))
+        low, high = (numpy.sort(tree, axis=0)[n] for n in (cut, len(tree) - 1 - cut))
+        for m in planted:
+            scale = numpy.linalg.norm(m[0, :3])
+            numpy.testing.assert_allclose(m[:3, :3] @ m[:3, :3].T, scale**2 * numpy.eye(3), atol=1e-12)
+            self.assertGreater(numpy.linalg.det(m[:3, :3]), 0)
+            stands = m @ [(low[0] + high[0]) / 2, low[1], (low[2] + high[2]) / 2, 1]
+            self.assertAlmostEqual(stands[1], height(stands[0], -stands[2]), places=6)
+            numpy.testing.assert_allclose((m @ [0, 1, 0, 0])[:3], [0, scale, 0], atol=1e-9)
+
     def test_points_of_a_tree_lie_evenly_on_its_trunk(self):
         """The trunk is a cone with radii 0.03 and 0.021 and the height 0.3. Branches begin above."""
         r = subprocess.run([program.GENERATE, "tree", "-n", "200000", "-o", "tree.ply"],
@@ -342,10 +372,12 @@ class Generate(program.ProgramTest):
                                 (("cloud", "-n", "5", "-o", "x.raw"), "--count applies"),
                                 (("landscape", donut, "-o", "x.raw"), "must end in .ply"),
                                 (("tree", "-o", "x.raw"), "must end in .ply"),
+                                (("landscape", donut, "-n", "16384", "-o", "x.json"), "at most 16383"),
+                                (("landscape", "nowhere.ply", "-o", "x.json"), "nowhere.ply"),
                                 (("tree", donut, "-o", "x.ply"), "one argument too many"),
                                 (("tree", "-j", "2", "-o", "x.ply"), "do not apply to tree"),
 
-                                (("landscape", donut, "-o", "x.raw"), "must end in .ply or .las"),
+                                (("landscape", donut, "-o", "x.raw"), "must end in .ply, .las or .json"),
                                 (("landscape", "empty.ply", "-o", "x.las"), "empty.ply"),
                                 (("landscape", "nowhere.ply", "-o", "x.ply"), "nowhere.ply")):
             r = subprocess.run([program.GENERATE, *arguments], capture_output=True, text=True)
