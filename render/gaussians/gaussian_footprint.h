@@ -131,7 +131,7 @@ static inline double trip_gaussian_opacity(const trip_gaussian *g, const trip_ga
 {
     double opacity = (double)g->opacity;
     if (s->opacity_scale > 0 && s->opacity_scale != 1)
-        opacity = 1 - pow(1 - fmin(opacity, 1), s->opacity_scale);
+        opacity = 1 - pow(1 - fmin(opacity, TRIP_GAUSSIAN_ALPHA_MAX), s->opacity_scale);
     return opacity;
 }
 

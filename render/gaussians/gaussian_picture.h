@@ -18,11 +18,11 @@
  * follow:
  *
  *     S2 = J S J^T + TRIP_GAUSSIAN_LOW_PASS I
- *     o' = (1 - (1 - o)^opacity_scale) m,   m = sqrt(max(0.000025, |J S J^T| / |S2|))
+ *     o' = (1 - (1 - min(0.99, o))^opacity_scale) m,   m = sqrt(max(0.000025, |J S J^T| / |S2|))
  *     alpha(p) = min(0.99, o' exp(-q / 2)),  q = d^T S2^-1 d,  d = p - (X, Y)
  *
- * For scenes that are not antialiased, m is 1. An alpha below 1/255 counts as 0. No other bound
- * cuts the footprint off.
+ * With opacity_scale 1, o' is o m. For scenes that are not antialiased, m is 1. An alpha below 1/255
+ * counts as 0. No other bound cuts the footprint off.
  *
  * With the exact footprint, J is not limited. Let R and s be the rotation and the deviations, r(p)
  * the ray through p, and V = diag(s2 s3, s1 s3, s1 s2) R^T. Then:

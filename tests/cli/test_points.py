@@ -90,6 +90,15 @@ class Points(program.ProgramTest):
             self.assertAlmostEqual(picture[32, at, 3], expected, delta=0.02)
             self.assertAlmostEqual(picture[at, 32, 3], expected, delta=0.02)
 
+    def test_points_can_be_translucent(self):
+        """The centre of a large point has the opacity 1 - (1 - 0.99)^X."""
+        write_cloud("one.ply", [[0, 0, 0]])
+        for scale in 0.1, 0.5:
+            for order in "depth", "lists":
+                picture = self.front("one.ply", "--radius", "0.9", "--order", order, "--opacity-scale",
+                                     scale)
+                self.assertAlmostEqual(picture[32, 32, 3], 1 - 0.01 ** scale, delta=1e-3)
+
     def test_the_radius_of_a_file_holds_and_a_factor_multiplies_it(self):
         write_cloud("one.ply", [[0, 0, 0]], radius=[0.2], nx=[0], ny=[0], nz=[1])
         plain, twice = self.front("one.ply"), self.front("one.ply", "--radius", "2x")
