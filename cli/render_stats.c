@@ -329,8 +329,9 @@ int render_stats_describe(render_stats *s, const render_options *o, triptych *t)
     }
     if (frame.effects) {
         cJSON *effects = cJSON_AddArrayToObject(root, "effects");
-        static const char *const names[] = { "shadows", "occlusion", "cueing", NULL, "emission" };
-        for (int i = 0; i < 5; i++)
+        static const char *const names[] = { "shadows", "occlusion", "cueing",
+                                             NULL,      "emission",  "edl" };
+        for (int i = 0; i < 6; i++)
             if (frame.effects >> i & 1)
                 cJSON_AddItemToArray(effects, cJSON_CreateString(names[i]));
     }

@@ -69,7 +69,7 @@ static bool same_light(const void *a, const void *b)
 }
 
 static const char *const effect_names[] = { "shadows",  "occlusion", "cueing", "auto",
-                                            "emission", "none",      NULL };
+                                            "emission", "edl",       "none",   NULL };
 
 static int read_effects(const trip_option *row, const char *text, void *base)
 {
@@ -101,7 +101,7 @@ static void print_effects(const void *base, char *text, size_t bytes)
     const int which = ((const draw_settings *)base)->effects.which;
     size_t at = 0;
     text[0] = 0;
-    for (int i = 0; i < 5; i++)
+    for (int i = 0; strcmp(effect_names[i], "none"); i++)
         if (which >> i & 1)
             at += (size_t)snprintf(text + at, bytes - at, "%s%s", at ? "," : "", effect_names[i]);
 }
@@ -313,8 +313,9 @@ static const trip_option rows[DRAW_OPTIONS] = {
     [DRAW_EFFECTS] = { "effects", "auto|none|LIST",
                        "Switches effects on: shadows (not with --light head), "
                        "occlusion, emission (requires --emission) and cueing, joined by commas; "
+                       "edl for Gaussian scenes and clouds of points; "
                        "auto chooses by the kind of data",
-                       "none", .brief = "Switches on shadows, occlusion, cueing, emission",
+                       "none", .brief = "Switches on shadows, occlusion, cueing, edl, ...",
                        .group = DRAW_GROUP_LIGHT, .type = TRIP_OPTION_CUSTOM, AT(effects.which),
                        .read = read_effects, .print = print_effects },
     [DRAW_ANISOTROPY] = { "anisotropy", "G",
@@ -335,6 +336,17 @@ static const trip_option rows[DRAW_OPTIONS] = {
                            "Sets the temperatures in kelvin of heat 0 and of the greatest heat",
                            "0:2500", "requires --emission", .group = DRAW_GROUP_LIGHT,
                            .type = TRIP_OPTION_RANGE, AT(effects.kelvin), .lo = 0, .hi = 100000 },
+    [DRAW_EDL_STRENGTH] = { "edl-strength", "S",
+                            "Sets how much eye-dome lighting darkens pixels behind their "
+                            "neighbours",
+                            "0.4", "requires --effects edl or auto", .group = DRAW_GROUP_LIGHT,
+                            .type = TRIP_OPTION_ABOVE, AT(effects.edl_strength), .lo = 0,
+                            .hi = 100 },
+    [DRAW_EDL_RADIUS] = { "edl-radius", "PX",
+                          "Sets the distance of the neighbours for eye-dome lighting in pixels",
+                          "1.4", "requires --effects edl or auto", .group = DRAW_GROUP_LIGHT,
+                          .type = TRIP_OPTION_NUMBER, AT(effects.edl_radius_px), .lo = 1,
+                          .hi = 64 },
     [DRAW_NO_SHADING] = { "no-shading", NULL,
                           "Draws the plain colours of the transfer function, and reads no normals",
                           .brief = "Draws the plain colours of the transfer function",

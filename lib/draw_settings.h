@@ -61,6 +61,8 @@ enum {
     DRAW_CUEING,
     DRAW_LIGHT_CELLS,
     DRAW_TEMPERATURE,
+    DRAW_EDL_STRENGTH,
+    DRAW_EDL_RADIUS,
     DRAW_NO_SHADING,
     DRAW_CLIP_BOX,
     DRAW_CLIP_PLANE,
@@ -147,6 +149,8 @@ int draw_settings_check_kind(const draw_settings *s, const triptych_resources *r
 bool draw_settings_applies(const draw_settings *s, int row, int kind);
 /* Returns whether a choice of a row that applies does too. */
 bool draw_settings_choice_applies(int row, int choice, int kind);
+/* Returns the effects that a kind of data can have: a sum of TRIPTYCH_EFFECT_SHADOWS, ... */
+int draw_settings_effects_of_kind(int kind);
 /* Unsets all settings that draw_settings_check_kind() would refuse. */
 void draw_settings_drop_kind(draw_settings *s, int kind);
 /* Unsets all settings that the other settings or the renderer exclude. */

@@ -41,6 +41,7 @@ enum {
     NEAREST = 1 << 27,
     UNFILTERED = 1 << 28,
     BY_SHEETS = 1 << 29,
+    MAY_EDL = 1 << 30,
 };
 
 static const uint64_t of_splats =
@@ -66,6 +67,10 @@ static const struct rule {
     { ROW(ANISOTROPY), ALL, 0, MAY_SHADOW, "requires --effects shadows or auto", IDLE },
     { ROW(CUEING), ALL, 0, MAY_CUE, "requires --effects cueing or auto", IDLE },
     { ROW(TEMPERATURE), ALL, 0, MAY_EMIT, "requires --effects emission or auto", IDLE },
+    { ROW(EDL_STRENGTH) | ROW(EDL_RADIUS), ALL, 0, MAY_EDL, "requires --effects edl or auto",
+      IDLE },
+    { ROW(EFFECTS), RENDERER(INTEGRAL), MAY_EDL, MAY_SHADOW, /* edl without auto */
+      "edl does not apply to --renderer integral, which has no distances", CONFLICT },
     { ROW(LIGHT_CELLS), ALL, 0, MAY_LATTICE,
       "requires --effects shadows, occlusion, emission or auto", IDLE },
     { ROW(EFFECTS), ALL, SHADOWS | HEADLIGHT, 0,
@@ -166,12 +171,13 @@ static int facts_of_effects(const draw_settings *s)
     const int which = s->effects.which, some = which & TRIPTYCH_EFFECT_AUTO ? ~0 : which;
     const int lattices =
         TRIPTYCH_EFFECT_SHADOWS | TRIPTYCH_EFFECT_OCCLUSION | TRIPTYCH_EFFECT_EMISSION;
-    return (s->light.no_shading && !which ? PLAIN : 0) |
+    return (s->light.no_shading && !(which & ~TRIPTYCH_EFFECT_EDL) ? PLAIN : 0) |
            (s->light.kind == TRIPTYCH_LIGHT_HEAD ? HEADLIGHT : 0) |
            (which & TRIPTYCH_EFFECT_SHADOWS ? SHADOWS : 0) |
            (some & TRIPTYCH_EFFECT_SHADOWS ? MAY_SHADOW : 0) |
            (some & TRIPTYCH_EFFECT_CUEING ? MAY_CUE : 0) |
-           (some & TRIPTYCH_EFFECT_EMISSION ? MAY_EMIT : 0) | (some & lattices ? MAY_LATTICE : 0);
+           (some & TRIPTYCH_EFFECT_EMISSION ? MAY_EMIT : 0) |
+           (some & TRIPTYCH_EFFECT_EDL ? MAY_EDL : 0) | (some & lattices ? MAY_LATTICE : 0);
 }
 
 static int facts_of_splats(const draw_settings *s)
@@ -295,7 +301,8 @@ static int check_clip(const triptych_clip *c)
 int draw_settings_check_ranges(const draw_settings *s)
 {
     const int effects = TRIPTYCH_EFFECT_SHADOWS | TRIPTYCH_EFFECT_OCCLUSION |
-                        TRIPTYCH_EFFECT_CUEING | TRIPTYCH_EFFECT_AUTO | TRIPTYCH_EFFECT_EMISSION;
+                        TRIPTYCH_EFFECT_CUEING | TRIPTYCH_EFFECT_AUTO | TRIPTYCH_EFFECT_EMISSION |
+                        TRIPTYCH_EFFECT_EDL;
     int status = 0;
     for (int i = 0; i < DRAW_OPTIONS && !status; i++)
         status = trip_option_check(&draw_settings_table.rows[i], s);
@@ -322,15 +329,18 @@ int draw_settings_check(const draw_settings *s, triptych_renderer *renderer, boo
 
 /* ---- kinds of data ---- */
 
-static const uint64_t of_scenes = ROW(ORDER) | ROW(SHEET) | ROW(HARMONICS);
-static const uint64_t of_both =
-    ROW(BACKGROUND) | ROW(CLIP_BOX) | ROW(CLIP_PLANE) | ROW(EARLY_TERMINATION) | ROW(FOOTPRINT) |
-    ROW(SAMPLES) | ROW(DEPTH) | ROW(NORMALISE) | ROW(METHOD) | ROW(H) | ROW(LOD) | ROW(TOLERANCE) | ROW(SHOW);
+static const uint64_t of_scenes =
+    ROW(ORDER) | ROW(SHEET) | ROW(HARMONICS) | ROW(EDL_STRENGTH) | ROW(EDL_RADIUS);
+static const uint64_t of_both = ROW(BACKGROUND) | ROW(CLIP_BOX) | ROW(CLIP_PLANE) |
+                                ROW(EARLY_TERMINATION) | ROW(FOOTPRINT) | ROW(SAMPLES) |
+                                ROW(DEPTH) | ROW(NORMALISE) | ROW(METHOD) | ROW(H) | ROW(LOD) |
+                                ROW(TOLERANCE) | ROW(EFFECTS) | ROW(SHOW);
 
 static const uint64_t of_clouds = ROW(LIGHT) | ROW(NO_SHADING);
 
 static const uint64_t not_of_objects = ROW(SHEET) | ROW(LOD) | ROW(MAX_BYTES) | ROW(MAX_MS) |
-                                       ROW(SHOW) | ROW(COUNT) | ROW(TEMPERATURE);
+                                       ROW(SHOW) | ROW(COUNT) | ROW(TEMPERATURE) |
+                                       ROW(EDL_STRENGTH) | ROW(EDL_RADIUS);
 
 #define NOT_OF_OBJECTS "does not apply to a picture with volumes beside other objects"
 
@@ -363,6 +373,12 @@ static uint64_t rows_of_kind(const draw_settings *s, int kind)
     if (kind == DRAW_KIND_OBJECTS) /* the finest level can be asked for */
         return ~not_of_objects | (s->lod.voxel_px == TRIPTYCH_ZERO ? ROW(LOD) : 0);
     return kind ? own & (has_one_layer(s) ? ~merging : ~0ULL) : ~of_scenes;
+}
+
+int draw_settings_effects_of_kind(int kind)
+{
+    return draw_kind_is_gaussian(kind) ? TRIPTYCH_EFFECT_EDL | TRIPTYCH_EFFECT_AUTO
+                                       : ~TRIPTYCH_EFFECT_EDL;
 }
 
 bool draw_settings_applies(const draw_settings *s, int row, int kind)
@@ -416,6 +432,12 @@ int draw_settings_check_kind(const draw_settings *s, const triptych_resources *r
         [DRAW_KIND_OBJECTS] = { .given = ~rows_of_kind(s, DRAW_KIND_OBJECTS),
                                 .why = NOT_OF_OBJECTS },
     };
+    static const char *const wrong_effects[] = {
+        [DRAW_KIND_VOLUME] = "edl applies to Gaussian scenes and clouds of points only",
+        [DRAW_KIND_SCENE] = "must be edl, auto or none for Gaussian scenes",
+        [DRAW_KIND_CLOUD] = "must be edl, auto or none for clouds of points",
+        [DRAW_KIND_OBJECTS] = "edl " NOT_OF_OBJECTS,
+    };
     const bool objects = kind == DRAW_KIND_OBJECTS;
     const uint64_t given = given_rows(s);
     const struct choice *choice = find_missing(s, kind);
@@ -425,6 +447,8 @@ int draw_settings_check_kind(const draw_settings *s, const triptych_resources *r
     };
     if (of_kinds[kind].given & given)
         return fail_rule(&of_kinds[kind], given);
+    if (s->effects.which & ~draw_settings_effects_of_kind(kind))
+        return trip_option_fail("--effects", wrong_effects[kind]);
     if (choice) {
         char option[64];
         snprintf(option, sizeof option, "--%s", draw_settings_table.rows[choice->row].name);
@@ -444,6 +468,7 @@ void draw_settings_drop_kind(draw_settings *s, int kind)
     const struct choice *choice;
     while ((choice = find_missing(s, kind)))
         draw_settings_unset(s, choice->row);
+    s->effects.which &= draw_settings_effects_of_kind(kind);
     for (int i = 0; i < DRAW_OPTIONS; i++)
         if (!draw_settings_applies(s, i, kind))
             draw_settings_unset(s, i);

@@ -55,8 +55,11 @@ struct triptych {
     trip_renderer *device_renderer;          /* composites the scene (gl); NULL: `renderer` does */
     bool scene_done;                         /* scene_frame is complete */
     bool lit;                                /* light shades the surfels of the frame */
-    double scene_opacity;                    /* factor of the optical depth; 0 means 1 */
-    double begun_ms;                         /* when scene_frame was begun */
+    /* For eye-dome lighting: a number for each pixel of the frame, from the budget. NULL: off. */
+    float *levels;
+    size_t levels_bytes;
+    double scene_opacity; /* factor of the optical depth; 0 means 1 */
+    double begun_ms;      /* when scene_frame was begun */
     bool open, has_function;
     trip_context_picture *pictures;
     trip_field *source;      /* values of the volume itself; NULL: the data set's values */
@@ -204,6 +207,12 @@ int trip_context_verify_scenes(const triptych *t);
 /* Fails with TRIP_USAGE (reported) unless a volume is open. */
 int trip_context_check_volume(const triptych *t);
 trip_view_object trip_context_scene_object(const triptych *t);
+/* Chooses the effects of a frame of a scene, and takes their memory. Its light must be chosen. */
+int trip_context_begin_scene_effects(triptych *t, bool cloud);
+/* Applies the effects to a picture without background, with its distances. */
+void trip_context_apply_scene_effects(triptych *t, float *rgba, const float *distances);
+void trip_context_end_scene_effects(triptych *t);
+void trip_context_explain_scene_effects(const triptych *t, FILE *out);
 int trip_context_begin_scene(triptych *t);
 int trip_context_step_scene(triptych *t, uint64_t deadline_ns);
 int trip_context_take_scene(triptych *t, float *rgba, float *depth);

@@ -1,4 +1,5 @@
-/* Chooses the effects of a frame, with reasons, and keeps the light map from frame to frame. */
+/* Chooses the effects of a frame, with reasons. Keeps the light map from frame to frame. */
+#include "eye_dome.h"
 #include "library_context.h"
 #include "report.h"
 
@@ -178,8 +179,9 @@ static void explain(const triptych *t, const char *name, int effect, bool runs, 
     else if (automatic && !(t->given.effects.which & effect) && effect == TRIPTYCH_EFFECT_EMISSION)
         why = runs ? "a data set of heat is given" : "no data set of heat is given";
     else if (automatic && !(t->given.effects.which & effect))
-        why = runs || effect == TRIPTYCH_EFFECT_SHADOWS ? t->why_effects
-                                                        : "the kind of data does not call for it";
+        why = runs || effect & (TRIPTYCH_EFFECT_SHADOWS | TRIPTYCH_EFFECT_EDL)
+                  ? t->why_effects
+                  : "the kind of data does not call for it";
     fprintf(out, "%-11s %s: %s\n", name, runs ? "runs" : "does not run", why);
 }
 
@@ -222,4 +224,73 @@ void trip_context_explain_effects(const triptych *t, FILE *out)
         explain_lattice(t, out);
     if (e->emission)
         explain_heat(t, out);
+}
+
+/* ---- Gaussian scenes ---- */
+
+/* Colours of a camera have no light that shows their shape. */
+static bool suits_eye_dome(triptych *t, bool cloud, bool integral)
+{
+    t->why_effects = integral ? "the integral has no distances"
+                     : !cloud ? "a Gaussian scene keeps its colours"
+                     : t->lit ? "light shades the points"
+                              : "no light shades the points";
+    return !integral && cloud && !t->lit;
+}
+
+int trip_context_begin_scene_effects(triptych *t, bool cloud)
+{
+    const bool integral = t->resources.renderer == TRIPTYCH_RENDERER_INTEGRAL;
+    const bool given = t->given.effects.which & TRIPTYCH_EFFECT_EDL;
+    const bool automatic = t->given.effects.which & TRIPTYCH_EFFECT_AUTO;
+    t->why_effects = NULL;
+    const bool chosen = automatic && suits_eye_dome(t, cloud, integral);
+    if (t->mixed || !(chosen || given))
+        return 0;
+    int status = check_effects(t, TRIPTYCH_EFFECT_EDL);
+    if (!status && integral)
+        status = trip_option_fail("--effects", "edl does not apply to --renderer integral");
+    if (status)
+        return status;
+    t->levels_bytes = (size_t)t->camera.width * (size_t)t->camera.height * sizeof *t->levels;
+    t->levels = trip_budget_take(t->session.budget, t->levels_bytes);
+    return t->levels ? 0
+                     : trip_fail(TRIP_ERROR, "render", "edl",
+                                 "the distances of %d x %d pixels do not fit in memory; raise "
+                                 "--memory or lower --size or --samples",
+                                 t->camera.width, t->camera.height);
+}
+
+/* Returns the settings. Lengths count in pixels of the picture, also with several rays. */
+static trip_eye_dome eye_dome_of(const triptych *t)
+{
+    const triptych_effects *e = &t->given.effects;
+    return (trip_eye_dome){
+        .strength = e->edl_strength > 0 ? e->edl_strength : TRIP_EYE_DOME_STRENGTH,
+        .radius_px = e->edl_radius_px > 0 ? e->edl_radius_px : TRIP_EYE_DOME_RADIUS_PX,
+    };
+}
+
+void trip_context_apply_scene_effects(triptych *t, float *rgba, const float *distances)
+{
+    trip_eye_dome e = eye_dome_of(t);
+    e.radius_px *= t->drawn_settings.samples;
+    trip_eye_dome_darken(&e, &t->camera, distances, t->levels, rgba);
+}
+
+void trip_context_end_scene_effects(triptych *t)
+{
+    trip_budget_release(t->session.budget, t->levels, t->levels_bytes);
+    t->levels = NULL;
+    t->levels_bytes = 0;
+}
+
+void trip_context_explain_scene_effects(const triptych *t, FILE *out)
+{
+    const trip_eye_dome e = eye_dome_of(t);
+    if (t->mixed)
+        return;
+    explain(t, "edl", TRIPTYCH_EFFECT_EDL, t->levels != NULL, out);
+    if (t->levels)
+        fprintf(out, "            strength %g, neighbours at %g pixels\n", e.strength, e.radius_px);
 }

@@ -347,13 +347,13 @@ static trip_gaussian_settings settings_of(const triptych *t)
                                                                        : g->all.early_termination,
         .clip = trip_context_clip(t),
         .light = t->lit ? &t->drawn_settings : NULL,
-        .depth = g->all.depth || t->mixed,
+        .depth = g->all.depth || t->mixed || t->levels,
     };
     for (unsigned i = 0; i < t->placed_count; i++)
         out.antialiased &= (t->placed[i].set->header.flags & TRIP_GAUSSIAN_ANTIALIASED) != 0;
     if (out.degree > degree_of(t))
         out.degree = degree_of(t);
-    if (!t->mixed) /* it comes behind everything */
+    if (!t->mixed && !t->levels) /* it comes behind everything */
         memcpy(out.background, t->settings.background, sizeof out.background);
     return out;
 }
@@ -444,6 +444,8 @@ int trip_context_begin_scene(triptych *t)
     t->drawn_settings.samples = side;
     t->begun_ms = trip_now_ms();
     status = choose_light(t);
+    if (!status)
+        status = trip_context_begin_scene_effects(t, kind_of(t) == DRAW_KIND_CLOUD);
     if (status) {
         trip_context_end_scene(t);
         return status;
@@ -514,6 +516,7 @@ static triptych_frame_stats stats_of(const triptych *t)
         .early_termination = trip_gaussian_termination(&settings),
         .rays = t->drawn_settings.samples,
         .expected_error = -1,
+        .effects = t->levels ? TRIPTYCH_EFFECT_EDL : 0,
     };
 }
 
@@ -545,8 +548,14 @@ int trip_context_take_scene(triptych *t, float *rgba, float *depth)
 {
     const int side = t->drawn_settings.samples;
     float *picture = side > 1 ? t->before : rgba;
+    float *distances = depth ? depth : t->levels;
     int status = t->mixed ? trip_context_take_mixed(t, picture, depth)
-                          : trip_gaussian_frame_picture(t->scene_frame, picture, depth);
+                          : trip_gaussian_frame_picture(t->scene_frame, picture, distances);
+    if (!status && t->levels)
+        trip_context_apply_scene_effects(t, picture, distances);
+    if (!status && t->levels && !t->given.all.normalise)
+        trip_put_behind(picture, (size_t)t->camera.width * (size_t)t->camera.height,
+                        t->settings.background);
     if (!status && side > 1)
         trip_context_take_means(picture, side, t->turned.width, t->turned.height, rgba);
     if (!status && t->given.all.normalise)
@@ -569,6 +578,7 @@ void trip_context_end_scene(triptych *t)
     t->scene_frame = NULL;
     if (t->mixed)
         trip_context_end_mixed(t);
+    trip_context_end_scene_effects(t);
     trip_budget_release(t->session.budget, t->before, t->before_bytes);
     t->before = NULL;
     t->before_bytes = 0;
@@ -610,6 +620,7 @@ void trip_context_explain_scene(const triptych *t, FILE *out)
             : settings.shape == TRIP_GAUSSIAN_EWA ? "EWA, projected at the centre without limits"
                                                   : "projected at the centre, as in training",
             settings.antialiased ? "; opacity compensated for the blur of pixels" : "");
+    trip_context_explain_scene_effects(t, out);
 }
 
 /* ---- scene files ---- */

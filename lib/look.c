@@ -174,7 +174,7 @@ static void use_settings(triptych *t, const draw_settings *s)
         next.target == t->settings.target && next.compositing == t->settings.compositing;
     t->kernel_warned &= next.kernel == t->settings.kernel;
     /* The memory of earlier frames may be needed for the light map. */
-    if (s->effects.which != t->given.effects.which ||
+    if ((s->effects.which ^ t->given.effects.which) & ~TRIPTYCH_EFFECT_EDL ||
         next.effects.cells != t->settings.effects.cells)
         trip_context_drop_renderer(t);
     t->given = *s;

@@ -592,6 +592,9 @@ enum {
     TRIPTYCH_EFFECT_AUTO = 8,
     /* Hot matter radiates as a black body; needs triptych_set_heat(). */
     TRIPTYCH_EFFECT_EMISSION = 16,
+    /* Eye-dome lighting: pixels that lie behind their neighbours become darker. For Gaussian scenes
+     * and clouds of points, which have no other effect. Not with the integral renderer. */
+    TRIPTYCH_EFFECT_EDL = 32,
 };
 
 typedef struct triptych_effects {
@@ -606,6 +609,9 @@ typedef struct triptych_effects {
     /* Shadows, occlusion and emission: cells of the lattice along its longest side, 8 to 1024;
      * default 128. A cell is at least one voxel long. */
     int light_cells;
+    /* Eye-dome lighting: its strength, above 0 to 100, default 0.4, and the distance of the
+     * neighbours in pixels, 1 to 64, default 1.4. */
+    double edl_strength, edl_radius_px;
 } triptych_effects;
 
 /* Clipping. Post and the integral cut rays exactly. Pre drops whole splats by the position of their

@@ -275,7 +275,7 @@ class Points(program.ProgramTest):
                                     says="does not apply to Gaussian scenes")
         write_cloud("a.ply", grid(4))
         self.leaves_nothing(2, "render", "a.ply", "-o", "no.png", "--effects", "shadows",
-                            says="does not apply to clouds of points")
+                            says="must be edl, auto or none for clouds of points")
 
     # ---- up ----
 

@@ -8,8 +8,9 @@
 static draw_settings full(void)
 {
     static const char *const options =
-        " --background 0.25,0.5,0.75,1 --light point:1,-2,0.1 --effects shadows,emission"
-        " --anisotropy -0.5 --cueing 0.25 --light-cells 64 --temperature 100:3000 --no-shading"
+        " --background 0.25,0.5,0.75,1 --light point:1,-2,0.1 --effects shadows,emission,edl"
+        " --anisotropy -0.5 --cueing 0.25 --light-cells 64 --temperature 100:3000"
+        " --edl-strength 0.5 --edl-radius 2 --no-shading"
         " --clip-box voxels:1,2,3,4,5.5,6 --clip-plane 1,0,0,-3 --clip-plane 0,1,0,0.1"
         " --quality high --classify pre --early-termination 0 --kernel ewa --interpolation cubic"
         " --lod 1.5 --max-bytes 1048576 --max-ms 20 --samples 3 --samples-per-sheet auto"
@@ -42,7 +43,8 @@ static void options_set_the_members_of_their_names(void **state)
     assert_true(s.background[1] == 0.5 && s.background[3] == 1);
     assert_int_equal(s.light.kind, TRIPTYCH_LIGHT_POINT);
     assert_true(s.light.toward[1] == -2 && s.light.no_shading);
-    assert_int_equal(s.effects.which, TRIPTYCH_EFFECT_SHADOWS | TRIPTYCH_EFFECT_EMISSION);
+    assert_int_equal(s.effects.which,
+                     TRIPTYCH_EFFECT_SHADOWS | TRIPTYCH_EFFECT_EMISSION | TRIPTYCH_EFFECT_EDL);
     assert_true(s.effects.kelvin[0] == 100 && s.effects.kelvin[1] == 3000);
     assert_true(s.clip.box && s.clip.box_of_voxels && s.clip.box_hi[1] == 5.5);
     assert_int_equal(s.clip.planes, 2);

@@ -117,8 +117,17 @@ static void settings_of_another_kind_of_data_are_refused_and_dropped(void **stat
         draw_kind kind;
         const char *says, *kept;
     } cases[] = {
-        { "--effects occlusion --order lists", DRAW_KIND_SCENE, "--effects: does not apply",
+        { "--effects occlusion --order lists", DRAW_KIND_SCENE, "--effects: must be edl, auto",
           " --order lists" },
+        { "--effects edl,cueing --edl-radius 2", DRAW_KIND_CLOUD, "--effects: must be edl, auto",
+          " --effects edl --edl-radius 2" },
+        { "--effects edl --quality high", DRAW_KIND_VOLUME, "--effects: edl applies to Gaussian",
+          " --quality high" },
+        { "--edl-strength 2", DRAW_KIND_VOLUME, "--edl-strength: applies to Gaussian", "" },
+        { "--effects edl,occlusion", DRAW_KIND_OBJECTS, "--effects: edl does not apply",
+          " --effects occlusion" },
+        { "--effects auto --edl-radius 2", DRAW_KIND_OBJECTS, "--edl-radius: does not apply",
+          " --effects auto" },
         { "--h 0.5", DRAW_KIND_SCENE, "--h: does not apply to scenes with --order depth", "" },
         { "--h 0.5 --order depth", DRAW_KIND_SCENE, "--h: does not apply", " --order depth" },
         { "--h 0.5 --method axis --order lists", DRAW_KIND_SCENE, "",

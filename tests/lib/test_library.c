@@ -1459,7 +1459,7 @@ static void measured_volumes_have_effects_only_on_request(void **state)
     s.effects.which = TRIPTYCH_EFFECT_EMISSION;
     assert_int_equal(draw_settings_use(t, &s), TRIPTYCH_OK);
     assert_fails(t, triptych_begin(t), TRIPTYCH_USAGE, "needs a data set of heat");
-    s.effects.which = 32;
+    s.effects.which = 64;
     assert_fails(t, draw_settings_use(t, &s), TRIPTYCH_USAGE, "unknown effect");
     triptych_destroy(t);
 }
