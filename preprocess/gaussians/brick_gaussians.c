@@ -5,6 +5,7 @@
 #include "gaussian_code.h"
 #include "gaussian_encoder.h"
 #include "gaussian_levels.h"
+#include "gaussian_lists.h"
 #include "gaussian_sort.h"
 #include "gaussian_writer.h"
 #include "harmonics_palette.h"
@@ -22,11 +23,21 @@ enum {
     GROUP_RECORDS = 512, /* classes of a node with fewer records join larger classes */
     READ_MIN = 1024,     /* splats that are read at once */
     READ_MAX = 1 << 16,
-    READ_PART = 4, /* at most this part of the free memory */
+    READ_PART = 4,    /* at most this part of the free memory */
+    MERGED_MAX = 256, /* splats of a node's buffer */
+    MERGED_PART = 16, /* of the free memory, at most, for all these buffers */
 };
 
 /* The greatest mean error of colours by a palette that is selected by itself. */
 #define PALETTE_ERROR (0.5 / 255)
+
+/* Coarse splats of a node on their way to the file. At most one node of each depth has some at a
+ * time. */
+typedef struct merging {
+    uint64_t node, done; /* and its splats in the file */
+    unsigned used;       /* splats in the buffer */
+    unsigned char *buffer;
+} merging;
 
 typedef struct bricker {
     const trip_brick_gaussians_params *p;
@@ -45,9 +56,15 @@ typedef struct bricker {
     double typical_lo[3], typical_hi[3];
     trip_octree octree;
     trip_gaussian_levels *levels;
-    trip_output ordered, merged; /* the next spool: splats of the scene, coarse splats */
-    uint64_t numbered;           /* splats of the next spool */
-    uint64_t *groups;            /* records by node and class; see group_of() */
+    trip_output ordered; /* the next spool */
+    uint64_t numbered;   /* its splats */
+    trip_output merged;  /* coarse splats by node */
+    merging *mergings;   /* one for each depth of the octree */
+    size_t mergings_bytes;
+    unsigned depths, merging_room; /* and splats of each buffer */
+    uint64_t *merged_first;        /* of the octree's nodes: first splat in `merged` */
+    uint64_t *counts;              /* of their splats */
+    uint64_t *groups;              /* records by node and class; see group_of() */
     size_t groups_bytes;
     uint8_t *joined; /* class index of the group that a group joins */
     trip_file_gaussian_node *nodes;
@@ -57,12 +74,14 @@ typedef struct bricker {
     uint64_t vector_count, vector_room;
     trip_palette palette;
     double palette_error;
-    /* These belong to the axis that is being written. */
+    trip_gaussian_tree trees[3];
+    trip_gaussian_lists *lists;
+    /* These belong to a node that does not fit into memory, and to its list. */
     int axis;
-    trip_gaussian_tree tree;
-    uint64_t leaf;            /* of the gathered splats */
-    uint64_t leaf_left;       /* splats of the leaf that are not yet gathered */
-    unsigned gathered, piece; /* splats in the buffer, and the number that fills it */
+    const trip_listed_node *big; /* that is sorted on the disk */
+    uint64_t leaf;               /* of the gathered splats */
+    uint64_t leaf_left;          /* splats of the leaf that are not yet gathered */
+    unsigned gathered, piece;    /* splats in the buffer, and the number that fills it */
 } bricker;
 
 static const char *source_name(const bricker *b)
@@ -236,7 +255,7 @@ static int find_typical(bricker *b)
 
 static int send_gathered(bricker *b)
 {
-    const uint64_t group = b->tree.leaves[b->leaf].group;
+    const uint64_t group = b->trees[b->axis].leaves[b->leaf].group;
     const trip_gaussian_piece piece = {
         .axis = b->axis,
         .node = b->node_numbers[group / class_count(b)],
@@ -247,27 +266,18 @@ static int send_gathered(bricker *b)
     return trip_gaussian_encoder_send(b->encoder, &piece);
 }
 
-/* A leaf with too many splats becomes several bricks with equal numbers. */
-static unsigned piece_of(uint64_t left)
-{
-    const uint64_t pieces =
-        (left + TRIP_GAUSSIAN_BRICK_RECORDS_MAX - 1) / TRIP_GAUSSIAN_BRICK_RECORDS_MAX;
-    return (unsigned)((left + pieces - 1) / pieces);
-}
-
 static int gather(void *user, const unsigned char *spilled)
 {
     bricker *b = user;
     const uint64_t leaf = ((const trip_spilled *)(const void *)spilled)->group;
     if (b->gathered == 0) {
         if (b->leaf_left == 0)
-            b->leaf_left = b->tree.leaves[leaf].records;
+            b->leaf_left = b->trees[b->axis].leaves[leaf].records;
         b->leaf = leaf;
-        b->piece = piece_of(b->leaf_left);
+        b->piece = trip_piece_count(b->leaf_left);
     }
     memcpy(trip_gaussian_encoder_room(b->encoder) + b->gathered++ * b->stride, spilled, b->stride);
     b->leaf_left--;
-    tell_progress(b, 1);
     return b->gathered == b->piece ? send_gathered(b) : TRIP_OK;
 }
 
@@ -317,21 +327,75 @@ static int count_splat(void *user, const unsigned char *spilled)
                : status;
 }
 
+static int write_merging(bricker *b, merging *m)
+{
+    const size_t bytes = m->used * b->stride;
+    if (!bytes)
+        return TRIP_OK;
+    const uint64_t at = b->merged_first[m->node] + m->done;
+    m->done += m->used;
+    m->used = 0;
+    return trip_output_patch(&b->merged, at * b->stride, m->buffer, bytes);
+}
+
 static int emit_coarse(void *user, uint64_t node, const trip_gaussian *g)
 {
     bricker *b = user;
-    unsigned char spilled[sizeof(trip_spilled) + sizeof *g] = { 0 };
+    merging *m = &b->mergings[b->octree.nodes[node].depth];
+    int status = TRIP_OK;
+    if (m->used == b->merging_room || (m->used && m->node != node))
+        status = write_merging(b, m);
+    if (m->node != node)
+        m->node = node, m->done = 0;
+    unsigned char *to = m->buffer + m->used++ * b->stride;
     const trip_spilled head = { .number = b->records + b->coarse, .group = node };
-    memcpy(spilled, &head, sizeof head);
-    memcpy(spilled + sizeof head, g, sizeof *g);
+    memcpy(to, &head, sizeof head);
+    memcpy(to + sizeof head, g, b->stride - sizeof head);
     b->groups[group_of(b, node, class_of(g))]++;
     if (trip_gaussian_is_sampled(b->coarse, b->records)) {
-        trip_gaussian_point *to = &b->sample.points[b->sample.count++];
-        memcpy(to->centre, g->centre, sizeof to->centre);
-        to->group = group_of(b, node, class_of(g));
+        trip_gaussian_point *point = &b->sample.points[b->sample.count++];
+        memcpy(point->centre, g->centre, sizeof point->centre);
+        point->group = group_of(b, node, class_of(g));
     }
     b->coarse++;
-    return trip_output_append(&b->merged, spilled, b->stride);
+    return status;
+}
+
+/* Finds the places of the nodes' coarse splats. */
+static int begin_merging(bricker *b)
+{
+    uint64_t all = 0;
+    for (uint64_t i = 0; i < b->octree.node_count; i++)
+        if (b->octree.nodes[i].depth >= b->depths)
+            b->depths = b->octree.nodes[i].depth + 1;
+    const uint64_t most = trip_budget_left_bytes(b->budget) / MERGED_PART / b->depths / b->stride;
+    b->merging_room = most > MERGED_MAX ? MERGED_MAX : most < 1 ? 1 : (unsigned)most;
+    const size_t each = sizeof *b->mergings + b->merging_room * b->stride;
+    b->mergings_bytes = b->depths * each + b->octree.node_count * 2 * sizeof *b->counts;
+    b->mergings = trip_budget_take(b->budget, b->mergings_bytes);
+    if (!b->mergings)
+        return fail_memory(b);
+    b->merged_first = (void *)(b->mergings + b->depths);
+    b->counts = b->merged_first + b->octree.node_count;
+    unsigned char *buffers = (void *)(b->counts + b->octree.node_count);
+    for (unsigned i = 0; i < b->depths; i++)
+        b->mergings[i] =
+            (merging){ .node = UINT64_MAX, .buffer = buffers + i * b->merging_room * b->stride };
+    for (uint64_t i = 0; i < b->octree.node_count; i++) {
+        b->merged_first[i] = all;
+        b->counts[i] = trip_gaussian_levels_records(b->levels, i);
+        all += b->octree.nodes[i].children[0] ? b->counts[i] : 0;
+    }
+    const int status = make_output(b, &b->merged);
+    return status == TRIP_OK ? trip_output_reserve(&b->merged, all * b->stride) : status;
+}
+
+static int end_merging(bricker *b)
+{
+    int status = TRIP_OK;
+    for (unsigned i = 0; i < b->depths && status == TRIP_OK; i++)
+        status = write_merging(b, &b->mergings[i]);
+    return status;
 }
 
 static int merge_splats(bricker *b)
@@ -400,22 +464,17 @@ static int set_groups_of_sample(bricker *b)
     return TRIP_OK;
 }
 
-/* Appends the coarse splats to the spool. */
+/* Makes the coarse splats. */
 static int add_levels(bricker *b)
 {
     int status = set_groups_of_sample(b);
     if (status == TRIP_OK)
-        status = make_output(b, &b->merged);
+        status = begin_merging(b);
     if (status == TRIP_OK)
         status = merge_splats(b);
     if (status == TRIP_OK)
         status = trip_gaussian_levels_end(b->levels);
-    if (status == TRIP_OK)
-        status = trip_output_flush(&b->merged);
-    if (status == TRIP_OK)
-        status = trip_output_append_output(&b->spool, &b->merged);
-    trip_output_close(&b->merged);
-    return status == TRIP_OK ? trip_output_flush(&b->spool) : status;
+    return status == TRIP_OK ? end_merging(b) : status;
 }
 
 /* Joins groups with few records to the group of the next larger class in their node. */
@@ -526,7 +585,9 @@ static int take_vectors(bricker *b, uint64_t all)
             status = check_interrupted(b);
         if (status < 0 || b->vector_count >= (uint64_t)((double)(i + 1) * share + 1e-6))
             continue;
-        status = trip_output_read(&b->spool, i * b->stride, spilled, b->stride);
+        status = i < b->records ? trip_output_read(&b->spool, i * b->stride, spilled, b->stride)
+                                : trip_output_read(&b->merged, (i - b->records) * b->stride,
+                                                   spilled, b->stride);
         memcpy((char *)b->vectors + bytes * b->vector_count++, g->sh[1], bytes);
     }
     return status;
@@ -577,26 +638,29 @@ static int make_palette(bricker *b)
 static void place_in_tree(void *user, const trip_gaussian *g, trip_spilled *head)
 {
     const bricker *b = user;
-    const uint64_t group = group_of(b, head->group, class_of(g));
+    const uint64_t node = b->big->node, group = group_of(b, node, class_of(g));
     head->group =
-        trip_gaussian_tree_leaf(&b->tree, g->centre, group_of(b, head->group, b->joined[group]));
+        trip_gaussian_tree_leaf(&b->trees[b->axis], g->centre, group_of(b, node, b->joined[group]));
     head->at = g->centre[b->axis];
 }
 
 static void count_in_leaf(void *user, uint64_t leaf, uint64_t splats)
 {
     bricker *b = user;
-    atomic_fetch_add_explicit(&b->tree.leaves[leaf].records, splats, memory_order_relaxed);
+    atomic_fetch_add_explicit(&b->trees[b->axis].leaves[leaf].records, splats,
+                              memory_order_relaxed);
 }
 
-static int write_axis(bricker *b, int axis)
+/* Writes a node that does not fit into memory. */
+static int write_big(bricker *b, const trip_listed_node *node)
 {
-    b->axis = axis;
-    b->leaf_left = 0;
-    if (!trip_gaussian_tree_build(&b->tree, &b->sample, axis, b->groups, group_count(b), b->budget))
-        return fail_memory(b);
-    int status = trip_gaussian_sort(&(trip_gaussian_sort_params){ .spool = &b->spool,
-                                                                  .records = b->records + b->coarse,
+    int status = TRIP_OK;
+    b->big = node;
+    for (b->axis = 0; b->axis < 3 && status == TRIP_OK; b->axis++) {
+        b->leaf_left = 0;
+        status = trip_gaussian_sort(&(trip_gaussian_sort_params){ .spool = node->from,
+                                                                  .first = node->first,
+                                                                  .records = node->count,
                                                                   .degree = b->p->degree,
                                                                   .folder = b->folder,
                                                                   .path = b->p->path,
@@ -606,10 +670,66 @@ static int write_axis(bricker *b, int axis)
                                                                   .emit = gather,
                                                                   .user = b },
                                     b->budget);
-    if (status == TRIP_OK)
-        status = trip_gaussian_encoder_finish(b->encoder);
-    trip_gaussian_tree_free(&b->tree);
+        if (status == TRIP_OK)
+            status = trip_gaussian_encoder_finish(b->encoder);
+    }
     return status;
+}
+
+/* Without enough memory, all nodes are sorted on the disk. */
+static void begin_lists(bricker *b, uint64_t most)
+{
+    trip_gaussian_lists_begin(&b->lists,
+                              &(trip_gaussian_lists_params){ .writer = b->writer,
+                                                             .workers = b->workers,
+                                                             .degree = b->p->degree,
+                                                             .trees = b->trees,
+                                                             .joined = b->joined,
+                                                             .class_count = class_count(b),
+                                                             .class_lo = b->class_lo },
+                              most, b->budget);
+}
+
+static int write_node(bricker *b, const trip_listed_node *node, uint64_t most)
+{
+    int status = TRIP_OK;
+    if (node->count <= trip_gaussian_lists_room(b->lists)) {
+        status = trip_gaussian_lists_add(b->lists, node);
+    } else {
+        status = trip_gaussian_lists_finish(b->lists);
+        trip_gaussian_lists_free(b->lists); /* the sort needs the memory */
+        b->lists = NULL;
+        if (status == TRIP_OK)
+            status = write_big(b, node);
+        begin_lists(b, most);
+    }
+    tell_progress(b, 3 * node->count);
+    return status == TRIP_OK ? check_interrupted(b) : status;
+}
+
+static int write_lists(bricker *b)
+{
+    uint64_t most = 0, first = 0;
+    int status = TRIP_OK;
+    for (int axis = 0; axis < 3; axis++)
+        if (!trip_gaussian_tree_build(&b->trees[axis], &b->sample, axis, b->groups, group_count(b),
+                                      b->budget))
+            return fail_memory(b);
+    for (uint64_t i = 0; i < b->octree.node_count; i++)
+        most = b->counts[i] > most ? b->counts[i] : most;
+    begin_lists(b, most);
+    for (uint64_t i = 0; i < b->octree.node_count && status == TRIP_OK; i++) {
+        const bool leaf = !b->octree.nodes[i].children[0];
+        const trip_listed_node node = { .node = i,
+                                        .number = b->node_numbers[i],
+                                        .from = leaf ? &b->spool : &b->merged,
+                                        .first = leaf ? first : b->merged_first[i],
+                                        .count = b->counts[i] };
+        if (node.count)
+            status = write_node(b, &node, most);
+        first += leaf ? node.count : 0;
+    }
+    return status == TRIP_OK ? trip_gaussian_lists_finish(b->lists) : status;
 }
 
 static int run_bricker(bricker *b)
@@ -638,8 +758,8 @@ static int run_bricker(bricker *b)
         status = make_levels(b);
     if (status == TRIP_OK)
         status = make_palette(b);
-    for (int axis = 0; axis < 3 && status == TRIP_OK; axis++)
-        status = write_axis(b, axis);
+    if (status == TRIP_OK)
+        status = write_lists(b);
     if (status < 0)
         return status;
     return trip_gaussian_writer_finish(b->writer, b->typical_lo, b->typical_hi);
@@ -655,6 +775,11 @@ static void free_bricker(bricker *b)
     trip_gaussian_levels_free(b->levels);
     if (b->sample.points)
         trip_budget_release(b->budget, b->sample.points, b->sample_bytes);
+    trip_gaussian_lists_free(b->lists);
+    for (int axis = 0; axis < 3; axis++)
+        trip_gaussian_tree_free(&b->trees[axis]);
+    if (b->mergings)
+        trip_budget_release(b->budget, b->mergings, b->mergings_bytes);
     if (b->groups)
         trip_budget_release(b->budget, b->groups, b->groups_bytes);
     if (b->nodes)

@@ -1,17 +1,7 @@
 #include "gaussian_encoder.h"
 
-#include <math.h>
-#include <string.h>
-
 #include "gaussian_sort.h"
-#include "key_sort.h"
 #include "report.h"
-
-/* Precision of a brick's centres: the box has 2^21 codes along an axis. A splat is large enough
- * for a box of 2^15 times its class. */
-#define BOX_CLASSES 32768.0
-/* A gap that divides a brick is at least this part of its box. */
-#define GAP_PART 0.25
 
 enum { SLOTS_OF_WORKER = 4, MEMORY_PART = 8 };
 
@@ -21,8 +11,8 @@ typedef struct slot {
     bool divided; /* by a gap: the owner encodes it */
     trip_file_gaussian_brick brick;
     unsigned char *spilled, *codes;
-    const unsigned char **splats, **others; /* addresses in `spilled` */
-    trip_key *keys, *scratch;
+    const unsigned char **splats; /* addresses in `spilled` */
+    trip_piece_room room;
 } slot;
 
 struct trip_gaussian_encoder {
@@ -50,11 +40,11 @@ static void set_slot(slot *s, unsigned char *room, size_t stride)
 {
     const size_t count = TRIP_GAUSSIAN_BRICK_RECORDS_MAX;
     s->spilled = room;
-    s->keys = (void *)(room + count * stride);
-    s->scratch = s->keys + count;
-    s->splats = (void *)(s->scratch + count);
-    s->others = s->splats + count;
-    s->codes = (void *)(s->others + count);
+    s->room.keys = (void *)(room + count * stride);
+    s->room.scratch = s->room.keys + count;
+    s->splats = (void *)(s->room.scratch + count);
+    s->room.others = s->splats + count;
+    s->codes = (void *)(s->room.others + count);
 }
 
 bool trip_gaussian_encoder_create(trip_gaussian_encoder **out, trip_gaussian_writer *writer,
@@ -90,72 +80,6 @@ unsigned char *trip_gaussian_encoder_room(const trip_gaussian_encoder *e)
     return e->slots[e->filling + e->filled].spilled;
 }
 
-/* ---- bricks ---- */
-
-static double centre_of(const unsigned char *splat, int axis)
-{
-    return ((const trip_gaussian *)(const void *)splat)->centre[axis];
-}
-
-/* Returns whether a box is too long along an axis for precise codes, and has a wide gap. Sets
- * *from to the first coordinate behind the gap. */
-static bool find_gap(const slot *s, const unsigned char **splats, unsigned count, int axis,
-                     double *from)
-{
-    double lo = INFINITY, hi = -INFINITY, widest = 0;
-    for (unsigned i = 0; i < count; i++) {
-        lo = fmin(lo, centre_of(splats[i], axis));
-        hi = fmax(hi, centre_of(splats[i], axis));
-    }
-    if (!(hi - lo > BOX_CLASSES * ldexp(1, 2 * s->piece.size_class)))
-        return false;
-    for (unsigned i = 0; i < count; i++)
-        s->keys[i] = (trip_key){ trip_key_of(centre_of(splats[i], axis)), i };
-    trip_key_sort(s->keys, s->scratch, count);
-    for (unsigned i = 1; i < count; i++) {
-        const double at = centre_of(splats[s->keys[i].number], axis);
-        const double gap = at - centre_of(splats[s->keys[i - 1].number], axis);
-        if (gap > widest)
-            widest = gap, *from = at;
-    }
-    return widest > GAP_PART * (hi - lo);
-}
-
-/* Moves the splats behind a gap to the end and keeps the order. Returns the number before it. */
-static unsigned divide(const slot *s, const unsigned char **splats, unsigned count, int axis,
-                       double from)
-{
-    unsigned left = 0, right = 0;
-    for (unsigned i = 0; i < count; i++)
-        if (centre_of(splats[i], axis) < from)
-            splats[left++] = splats[i];
-        else
-            s->others[right++] = splats[i];
-    memcpy(splats + left, s->others, right * sizeof *splats);
-    return left;
-}
-
-static int write_brick(trip_gaussian_encoder *e, slot *s)
-{
-    return trip_gaussian_writer_append(e->writer, s->piece.axis, s->piece.node, &s->brick,
-                                       s->codes);
-}
-
-/* Writes splats as bricks. Strays get bricks of their own, so that no other loses precision. */
-static int write_divided(trip_gaussian_encoder *e, slot *s, const unsigned char **splats,
-                         unsigned count)
-{
-    double from = 0;
-    for (int axis = 0; axis < 3; axis++)
-        if (find_gap(s, splats, count, axis, &from)) {
-            const unsigned left = divide(s, splats, count, axis, from);
-            const int status = write_divided(e, s, splats, left);
-            return status == TRIP_OK ? write_divided(e, s, splats + left, count - left) : status;
-        }
-    trip_gaussian_writer_encode(e->writer, s->piece.size_class, splats, count, &s->brick, s->codes);
-    return write_brick(e, s);
-}
-
 /* ---- loops ---- */
 
 static int encode_slot(void *user, unsigned thread, uint64_t item)
@@ -163,13 +87,10 @@ static int encode_slot(void *user, unsigned thread, uint64_t item)
     const trip_gaussian_encoder *e = user;
     slot *s = &e->encoding[item];
     const unsigned count = s->piece.count;
-    double from;
     (void)thread;
-    s->divided = false;
     for (unsigned i = 0; i < count; i++)
         s->splats[i] = s->spilled + i * e->stride + sizeof(trip_spilled);
-    for (int axis = 0; axis < 3; axis++)
-        s->divided = s->divided || find_gap(s, s->splats, count, axis, &from);
+    s->divided = trip_piece_has_gap(&s->piece, s->splats, &s->room);
     if (!s->divided)
         trip_gaussian_writer_encode(e->writer, s->piece.size_class, s->splats, count, &s->brick,
                                     s->codes);
@@ -187,7 +108,10 @@ static int end_loop(trip_gaussian_encoder *e)
     trip_workers_wait(e->workers, 0, &status);
     for (unsigned i = 0; i < count && status == TRIP_OK; i++) {
         slot *s = &e->encoding[i];
-        status = s->divided ? write_divided(e, s, s->splats, s->piece.count) : write_brick(e, s);
+        status = s->divided
+                     ? trip_piece_write_divided(e->writer, &s->piece, s->splats, &s->room, s->codes)
+                     : trip_gaussian_writer_append(e->writer, s->piece.axis, s->piece.node,
+                                                   &s->brick, s->codes);
     }
     return status;
 }

@@ -5,16 +5,10 @@
 
 #include <stdbool.h>
 
-#include "gaussian_writer.h"
+#include "gaussian_piece.h"
 #include "workers.h"
 
 typedef struct trip_gaussian_encoder trip_gaussian_encoder;
-
-typedef struct trip_gaussian_piece {
-    int axis, size_class;
-    uint64_t node;  /* of the data set */
-    unsigned count; /* splats, at most TRIP_GAUSSIAN_BRICK_RECORDS_MAX */
-} trip_gaussian_piece;
 
 /* Takes at most an eighth of the budget's free memory, but room for one piece at least. Returns
  * false if the budget is too small. */

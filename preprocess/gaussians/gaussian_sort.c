@@ -97,7 +97,7 @@ static void count_groups(const sorter *s, const trip_key *keys, size_t count)
 static int read_run(const sorter *s, uint64_t number, unsigned char *slice, trip_key *keys)
 {
     const size_t count = run_length(s, number);
-    const uint64_t at = number * s->run_splats * s->stride;
+    const uint64_t at = (s->p->first + number * s->run_splats) * s->stride;
     int status = TRIP_OK;
     for (size_t i = 0; i < count && status == TRIP_OK;) {
         const size_t end = count - i < READ_SPLATS ? count : i + READ_SPLATS;

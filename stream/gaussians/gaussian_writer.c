@@ -12,16 +12,16 @@
 #include <string.h>
 #include <xxhash.h>
 
-enum { BUFFER_BYTES = 1 << 16, BRICKS_BUFFER_BYTES = 1 << 14 };
+enum { BUFFER_BYTES = 1 << 15, BRICKS_BUFFER_BYTES = 1 << 13 };
 
 struct trip_gaussian_writer {
     trip_budget *budget;
     trip_folder folder;
     trip_file_gaussian_header header;
     const char *text;
-    int axis; /* of the open outputs; -1 before the first */
-    trip_output planes[TRIP_GAUSSIAN_PLANES];
-    trip_output bricks; /* unnamed, of all lists */
+    bool opened; /* the planes */
+    trip_output planes[3][TRIP_GAUSSIAN_PLANES];
+    trip_output bricks[3]; /* unnamed */
     trip_file_gaussian_node *nodes;
     trip_gaussian_palette palette;
     uint64_t records[3];
@@ -41,12 +41,14 @@ static int begin(trip_gaussian_writer *w, const trip_gaussian_writer_params *par
     int status = trip_folder_begin(&w->folder, params->path, params->replace);
     if (status < 0)
         return status;
-    return trip_output_create(&w->bricks,
-                              &(trip_output_params){ .folder = w->folder.partial,
-                                                     .name = TRIP_SPOOL_NAME,
-                                                     .buffer_bytes = BRICKS_BUFFER_BYTES,
-                                                     .unnamed = true },
-                              w->budget);
+    for (int a = 0; a < 3 && status == TRIP_OK; a++)
+        status = trip_output_create(&w->bricks[a],
+                                    &(trip_output_params){ .folder = w->folder.partial,
+                                                           .name = TRIP_SPOOL_NAME,
+                                                           .buffer_bytes = BRICKS_BUFFER_BYTES,
+                                                           .unnamed = true },
+                                    w->budget);
+    return status;
 }
 
 int trip_gaussian_writer_open(trip_gaussian_writer **out, const trip_gaussian_writer_params *params,
@@ -58,7 +60,6 @@ int trip_gaussian_writer_open(trip_gaussian_writer **out, const trip_gaussian_wr
     trip_file_gaussian_header *h = &w->header;
     w->budget = budget;
     w->folder.fd = -1;
-    w->axis = -1;
     w->text = params->text ? params->text : "{}";
     h->degree = (uint32_t)params->degree;
     h->flags = params->flags;
@@ -109,29 +110,31 @@ static void write_entries(const trip_gaussian_writer *w, const unsigned char *co
 static int finish_planes(trip_gaussian_writer *w)
 {
     int status = TRIP_OK;
-    for (unsigned n = 0; n < plane_count(w); n++) {
-        trip_output *o = &w->planes[n];
-        if (status == TRIP_OK && w->axis >= 0)
-            status = trip_output_flush(o);
-        if (status == TRIP_OK && w->axis >= 0)
-            status = trip_output_sync(o);
-        trip_output_close(o);
-    }
+    for (int a = 0; a < 3; a++)
+        for (unsigned n = 0; n < plane_count(w); n++) {
+            trip_output *o = &w->planes[a][n];
+            if (status == TRIP_OK && w->opened)
+                status = trip_output_flush(o);
+            if (status == TRIP_OK && w->opened)
+                status = trip_output_sync(o);
+            trip_output_close(o);
+        }
     return status;
 }
 
-static int open_planes(trip_gaussian_writer *w, int axis)
+static int open_planes(trip_gaussian_writer *w)
 {
     char name[32];
-    int status = finish_planes(w);
-    w->axis = axis;
-    for (unsigned n = 0; n < plane_count(w) && status == TRIP_OK; n++)
-        status = trip_output_create(
-            &w->planes[n],
-            &(trip_output_params){ .folder = w->folder.partial,
-                                   .name = trip_gaussian_plane_name(&w->header, axis, n, name),
-                                   .buffer_bytes = BUFFER_BYTES },
-            w->budget);
+    int status = TRIP_OK;
+    w->opened = true;
+    for (int a = 0; a < 3; a++)
+        for (unsigned n = 0; n < plane_count(w) && status == TRIP_OK; n++)
+            status = trip_output_create(
+                &w->planes[a][n],
+                &(trip_output_params){ .folder = w->folder.partial,
+                                       .name = trip_gaussian_plane_name(&w->header, a, n, name),
+                                       .buffer_bytes = BUFFER_BYTES },
+                w->budget);
     return status;
 }
 
@@ -196,10 +199,10 @@ int trip_gaussian_writer_append(trip_gaussian_writer *w, int axis, uint64_t node
                                 const trip_file_gaussian_brick *brick, const unsigned char *codes)
 {
     trip_file_gaussian_brick b = *brick;
-    int status = axis == w->axis ? TRIP_OK : open_planes(w, axis);
+    int status = w->opened ? TRIP_OK : open_planes(w);
     for (unsigned n = 0; n < plane_count(w) && status == TRIP_OK; n++) {
         const size_t bytes = b.records * (size_t)trip_gaussian_plane_bytes(&w->header, n);
-        status = trip_output_append(&w->planes[n], codes, bytes);
+        status = trip_output_append(&w->planes[axis][n], codes, bytes);
         codes += bytes;
     }
     b.first_record = w->records[axis];
@@ -207,33 +210,40 @@ int trip_gaussian_writer_append(trip_gaussian_writer *w, int axis, uint64_t node
     w->records[axis] += b.records;
     add_to_node(&w->header, &w->nodes[node], axis, &b);
     w->header.brick_count[axis]++;
-    return status == TRIP_OK ? trip_output_append(&w->bricks, &b, sizeof b) : status;
+    return status == TRIP_OK ? trip_output_append(&w->bricks[axis], &b, sizeof b) : status;
 }
 
-static int append_index(trip_gaussian_writer *w, trip_output *index)
+/* Appends the bricks of a list to the index. */
+static int append_bricks(trip_output *bricks, trip_output *index, XXH64_state_t *hash)
 {
-    trip_file_gaussian_header *h = &w->header;
     unsigned char piece[4096];
-    XXH64_state_t *hash = XXH64_createState();
-    if (!hash)
-        return trip_fail(TRIP_ERROR, "brick", w->folder.path, "out of memory");
-    XXH64_reset(hash, 0);
-    const size_t nodes_bytes = h->node_count * sizeof *w->nodes;
-    int status = trip_output_flush(&w->bricks);
-    if (status == TRIP_OK)
-        status = trip_output_append(index, h, sizeof *h); /* replaced below */
-    if (status == TRIP_OK)
-        status = trip_output_append(index, w->nodes, nodes_bytes);
-    XXH64_update(hash, w->nodes, nodes_bytes);
-    for (uint64_t at = 0; at < w->bricks.bytes && status == TRIP_OK;) {
-        const uint64_t left = w->bricks.bytes - at;
+    int status = trip_output_flush(bricks);
+    for (uint64_t at = 0; at < bricks->bytes && status == TRIP_OK;) {
+        const uint64_t left = bricks->bytes - at;
         const size_t bytes = left < sizeof piece ? (size_t)left : sizeof piece;
-        status = trip_output_read(&w->bricks, at, piece, bytes);
+        status = trip_output_read(bricks, at, piece, bytes);
         if (status == TRIP_OK)
             status = trip_output_append(index, piece, bytes);
         XXH64_update(hash, piece, bytes);
         at += bytes;
     }
+    return status;
+}
+
+static int append_index(trip_gaussian_writer *w, trip_output *index)
+{
+    trip_file_gaussian_header *h = &w->header;
+    XXH64_state_t *hash = XXH64_createState();
+    if (!hash)
+        return trip_fail(TRIP_ERROR, "brick", w->folder.path, "out of memory");
+    XXH64_reset(hash, 0);
+    const size_t nodes_bytes = h->node_count * sizeof *w->nodes;
+    int status = trip_output_append(index, h, sizeof *h); /* replaced below */
+    if (status == TRIP_OK)
+        status = trip_output_append(index, w->nodes, nodes_bytes);
+    XXH64_update(hash, w->nodes, nodes_bytes);
+    for (int a = 0; a < 3 && status == TRIP_OK; a++)
+        status = append_bricks(&w->bricks[a], index, hash);
     const size_t palette_bytes = h->palette_count * trip_gaussian_entry_bytes((int)h->degree);
     if (status == TRIP_OK && palette_bytes)
         status = trip_output_append(index, w->palette.entries, palette_bytes);
@@ -299,9 +309,11 @@ void trip_gaussian_writer_close(trip_gaussian_writer *w)
 {
     if (!w)
         return;
-    for (unsigned n = 0; n < TRIP_GAUSSIAN_PLANES; n++)
-        trip_output_close(&w->planes[n]);
-    trip_output_close(&w->bricks);
+    for (int a = 0; a < 3; a++) {
+        for (unsigned n = 0; n < TRIP_GAUSSIAN_PLANES; n++)
+            trip_output_close(&w->planes[a][n]);
+        trip_output_close(&w->bricks[a]);
+    }
     trip_folder_close(&w->folder);
     free(w);
 }

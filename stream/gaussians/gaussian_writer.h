@@ -1,5 +1,5 @@
-/* Writes the data set of a Gaussian scene: bricks of the lists along X, Y and Z, in order, then the
- * index. The folder gets its name only when all bytes are on the disk. One thread. */
+/* Writes the data set of a Gaussian scene: bricks of the lists along X, Y and Z, then the index.
+ * The folder gets its name only when all bytes are on the disk. One thread. */
 #ifndef TRIP_GAUSSIAN_WRITER_H
 #define TRIP_GAUSSIAN_WRITER_H
 
@@ -45,7 +45,7 @@ size_t trip_gaussian_writer_codes_bytes(const trip_gaussian_writer *w);
 void trip_gaussian_writer_encode(const trip_gaussian_writer *w, int size_class,
                                  const unsigned char *const *splats, unsigned count,
                                  trip_file_gaussian_brick *brick, unsigned char *codes);
-/* Appends a brick to a list. Axes ascend from call to call, and nodes ascend along an axis. */
+/* Appends a brick to a list. Nodes ascend along an axis. */
 int trip_gaussian_writer_append(trip_gaussian_writer *w, int axis, uint64_t node,
                                 const trip_file_gaussian_brick *brick, const unsigned char *codes);
 /* Writes the index and gives the folder its name. The header gets the `typical` bounds. */

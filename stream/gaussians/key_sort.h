@@ -1,4 +1,5 @@
-/* A stable sort of keys with a number each: radix sort by the bytes in which the keys differ. The
+/* A stable sort of keys with a number each. A radix sort orders the upper bits in which the keys
+ * differ. Insertions complete the order, or a radix sort of all bits does if they are too many. The
  * caller gives all memory. Any thread. */
 #ifndef TRIP_KEY_SORT_H
 #define TRIP_KEY_SORT_H
