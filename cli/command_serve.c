@@ -35,7 +35,7 @@ static const trip_option rows[] = {
 static const trip_option_table serve_table = { rows, sizeof rows / sizeof *rows };
 
 /* The tables of `serve`. */
-enum { OWN, LOOK, SETTINGS, HEAT, QUALITY, RENDERER, RESOURCES, VOLUME, SETS };
+enum { OWN, LOOK, SETTINGS, HEAT, QUALITY, RENDERER, RESOURCES, VOLUME, POINTS, SETS };
 
 typedef struct parse {
     serve_options *o;
@@ -58,7 +58,8 @@ static int check(void *user)
     trip_serve_params *s = &o->params;
     if (!s->input)
         return trip_option_fail("VOLUME", "no volume given; use `triptych serve VOLUME`");
-    int status = p->sets[VOLUME].given ? cached_volume_check_options(s->input) : 0;
+    const bool reads = p->sets[VOLUME].given || p->sets[POINTS].given;
+    int status = reads ? cached_volume_check_options(s->input) : 0;
     if (!status)
         status = quality_options_check(&o->quality, &s->settings, o->resources.renderer);
     if (!status)
@@ -86,6 +87,7 @@ static int parse_options(serve_options *o, int argc, char **argv)
                                     .base = &o->resources,
                                     .without = others },
                     [VOLUME] = { .table = &volume_options_table, .base = &o->volume.options },
+                    [POINTS] = { .table = &point_options_table, .base = &o->volume.options },
                 } };
     const command_line c = {
         .args_doc = "VOLUME|NAME.trip",

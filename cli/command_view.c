@@ -58,15 +58,15 @@ static const trip_option rows[] = {
 static const trip_option_table view_table = { rows, sizeof rows / sizeof *rows };
 
 /* The tables of `view`. */
-enum { OWN, VIEW, LOOK, SETTINGS, HEAT, QUALITY, RENDERER, RESOURCES, VOLUME, SETS };
+enum { OWN, VIEW, LOOK, SETTINGS, HEAT, QUALITY, RENDERER, RESOURCES, VOLUME, POINTS, SETS };
 
 typedef struct parse {
     view_command *o;
     option_set sets[SETS];
 } parse;
 
-/* Options for reading volumes require an input that is a volume, or no input: the user may then
- * open a volume later. */
+/* Options for reading files require an input that is a file, or no input: the user may then open a
+ * file later. */
 static int check_volume(const view_command *o)
 {
     bool volumes = o->params.count == 0;
@@ -91,7 +91,7 @@ static int check(void *user)
     if (o->params.heat && o->params.count != 1)
         return trip_option_fail("--emission", "applies to one data set; name it");
     int status = view_options_check(&o->view);
-    if (!status && p->sets[VOLUME].given)
+    if (!status && (p->sets[VOLUME].given || p->sets[POINTS].given))
         status = check_volume(o);
     if (!status)
         status = look_options_check(p->sets[LOOK].given);
@@ -137,6 +137,7 @@ static int parse_options(view_command *o, int argc, char **argv)
                                     .base = &o->resources,
                                     .without = others },
                     [VOLUME] = { .table = &volume_options_table, .base = &o->volume.options },
+                    [POINTS] = { .table = &point_options_table, .base = &o->volume.options },
                 } };
     const command_line c = {
         .args_doc = "[VOLUME|NAME.trip...]",

@@ -92,11 +92,24 @@ int library_check_scene_options(const triptych_brick_options *options)
     return 0;
 }
 
+/* The table of points looks at a part of the option --radius. */
+static int check_no_cloud_options(const triptych_brick_options *options)
+{
+    const char *name = options->point_radius_factor > 0 ? "radius" : NULL;
+    for (size_t i = 0; i < point_options_table.count && !name; i++)
+        if (trip_option_is_set(&point_options_table.rows[i], options))
+            name = point_options_table.rows[i].name;
+    char option[64];
+    snprintf(option, sizeof option, "--%s", name ? name : "");
+    return name ? trip_option_fail(option, "applies to clouds of points only") : 0;
+}
+
 int library_check_file_options(const triptych_brick_options *options, int kind)
 {
-    return kind == 3 ? library_check_cloud_options(options)
-           : kind    ? library_check_scene_options(options)
-                     : 0;
+    if (kind == 3)
+        return library_check_cloud_options(options);
+    const int status = check_no_cloud_options(options);
+    return !status && kind ? library_check_scene_options(options) : status;
 }
 
 bool library_is_scene(triptych *t, const char *input)

@@ -108,7 +108,7 @@ int viewed_volume_check(const viewed_volume *s, triptych *t, const char *input,
     int status = library_check_kind(t, input, s->settings, resources, &function);
     if (!status && is_scene && s->measured)
         status = library_fail_scene_option("error");
-    if (!status && is_scene && cached_volume_wanted(input))
+    if (!status && cached_volume_wanted(input))
         status = library_check_file_options(&s->options, is_scene);
     if (status)
         return status;

@@ -10,9 +10,9 @@
 #include "quality_options.h"
 
 typedef struct viewed_volume {
-    triptych_brick_options
-        options;          /* only the fields for reading a volume, memory and threads are set */
-    const char *function; /* transfer function to show, or NULL */
+    triptych_brick_options options; /* only the fields for reading a file, memory and threads are
+                                       set */
+    const char *function;           /* transfer function to show, or NULL */
     /* The volume that --error applies to, and the checksum of the measured data set (see
      * quality_options.h). NULL without --error. */
     const char *measured_volume, *measured;

@@ -377,8 +377,9 @@ static uint64_t rows_of_kind(const draw_settings *s, int kind)
 
 int draw_settings_effects_of_kind(int kind)
 {
-    return draw_kind_is_gaussian(kind) ? TRIPTYCH_EFFECT_EDL | TRIPTYCH_EFFECT_AUTO
-                                       : ~TRIPTYCH_EFFECT_EDL;
+    return kind == DRAW_KIND_SCENE   ? TRIPTYCH_EFFECT_EDL
+           : kind == DRAW_KIND_CLOUD ? TRIPTYCH_EFFECT_EDL | TRIPTYCH_EFFECT_AUTO
+                                     : ~TRIPTYCH_EFFECT_EDL;
 }
 
 bool draw_settings_applies(const draw_settings *s, int row, int kind)
@@ -434,7 +435,7 @@ int draw_settings_check_kind(const draw_settings *s, const triptych_resources *r
     };
     static const char *const wrong_effects[] = {
         [DRAW_KIND_VOLUME] = "edl applies to Gaussian scenes and clouds of points only",
-        [DRAW_KIND_SCENE] = "must be edl, auto or none for Gaussian scenes",
+        [DRAW_KIND_SCENE] = "must be edl or none for Gaussian scenes",
         [DRAW_KIND_CLOUD] = "must be edl, auto or none for clouds of points",
         [DRAW_KIND_OBJECTS] = "edl " NOT_OF_OBJECTS,
     };

@@ -208,7 +208,7 @@ int trip_context_verify_scenes(const triptych *t);
 int trip_context_check_volume(const triptych *t);
 trip_view_object trip_context_scene_object(const triptych *t);
 /* Chooses the effects of a frame of a scene, and takes their memory. Its light must be chosen. */
-int trip_context_begin_scene_effects(triptych *t, bool cloud);
+int trip_context_begin_scene_effects(triptych *t);
 /* Applies the effects to a picture without background, with its distances. */
 void trip_context_apply_scene_effects(triptych *t, float *rgba, const float *distances);
 void trip_context_end_scene_effects(triptych *t);

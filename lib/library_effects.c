@@ -229,22 +229,21 @@ void trip_context_explain_effects(const triptych *t, FILE *out)
 /* ---- Gaussian scenes ---- */
 
 /* Colours of a camera have no light that shows their shape. */
-static bool suits_eye_dome(triptych *t, bool cloud, bool integral)
+static bool suits_eye_dome(triptych *t, bool integral)
 {
     t->why_effects = integral ? "the integral has no distances"
-                     : !cloud ? "a Gaussian scene keeps its colours"
                      : t->lit ? "light shades the points"
                               : "no light shades the points";
-    return !integral && cloud && !t->lit;
+    return !integral && !t->lit;
 }
 
-int trip_context_begin_scene_effects(triptych *t, bool cloud)
+int trip_context_begin_scene_effects(triptych *t)
 {
     const bool integral = t->resources.renderer == TRIPTYCH_RENDERER_INTEGRAL;
     const bool given = t->given.effects.which & TRIPTYCH_EFFECT_EDL;
     const bool automatic = t->given.effects.which & TRIPTYCH_EFFECT_AUTO;
     t->why_effects = NULL;
-    const bool chosen = automatic && suits_eye_dome(t, cloud, integral);
+    const bool chosen = automatic && suits_eye_dome(t, integral);
     if (t->mixed || !(chosen || given))
         return 0;
     int status = check_effects(t, TRIPTYCH_EFFECT_EDL);

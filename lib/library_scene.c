@@ -140,6 +140,15 @@ static draw_kind kind_of(const triptych *t)
     return clouds ? DRAW_KIND_CLOUD : DRAW_KIND_SCENE;
 }
 
+/* Whether light shades a cloud without a light that is given. */
+static bool is_lit(const triptych *t)
+{
+    bool lit = false;
+    for (unsigned i = 0; i < t->placed_count; i++)
+        lit |= (t->placed[i].set->header.flags & TRIP_GAUSSIAN_SHADED) != 0;
+    return lit;
+}
+
 /* Adds a scene to the description of all. */
 static void add_to_scene(const triptych *t, unsigned i, triptych_scene *out)
 {
@@ -184,6 +193,7 @@ int triptych_get_scene(triptych *t, triptych_scene *out)
     out->z_up = t->scene && t->scene->header.flags & TRIP_GAUSSIAN_Z_UP;
     out->volumes = trip_context_count_mixed(t);
     out->clouds = kind_of(t) == DRAW_KIND_CLOUD;
+    out->lit = out->clouds && is_lit(t);
     out->objects = t->placed_count + out->volumes;
     out->moved = !is_alone(t);
     for (unsigned i = 0; i < t->placed_count; i++)
@@ -365,9 +375,7 @@ static int choose_light(triptych *t)
     const triptych_light *given = &t->given.light;
     const trip_affine identity = trip_affine_identity();
     trip_settings *s = &t->drawn_settings;
-    bool lit = given->kind != TRIPTYCH_LIGHT_DEFAULT;
-    for (unsigned i = 0; i < t->placed_count; i++)
-        lit |= (t->placed[i].set->header.flags & TRIP_GAUSSIAN_SHADED) != 0;
+    const bool lit = given->kind != TRIPTYCH_LIGHT_DEFAULT || is_lit(t);
     t->lit = lit && s->shading && kind_of(t) == DRAW_KIND_CLOUD;
     if (given->kind == TRIPTYCH_LIGHT_VIEW)
         s->light_direction = trip_normalize(trip_camera_direction(
@@ -445,7 +453,7 @@ int trip_context_begin_scene(triptych *t)
     t->begun_ms = trip_now_ms();
     status = choose_light(t);
     if (!status)
-        status = trip_context_begin_scene_effects(t, kind_of(t) == DRAW_KIND_CLOUD);
+        status = trip_context_begin_scene_effects(t);
     if (status) {
         trip_context_end_scene(t);
         return status;

@@ -226,6 +226,7 @@ typedef struct triptych_scene {
     unsigned objects, volumes; /* in the picture; volumes are counted in `objects` too */
     int clouds;                /* all objects are clouds of points, which have light */
     int moved;                 /* several objects, or one with a place of its own */
+    int lit;                   /* clouds that the default light shades */
 } triptych_scene;
 
 /* Returns 1 if the open data set is a Gaussian scene, or if objects with places are open. These

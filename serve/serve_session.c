@@ -263,6 +263,26 @@ static bool set_light(trip_document *d, const char *value)
     return true;
 }
 
+static bool has_light(const trip_document *d)
+{
+    return d->kind == DRAW_KIND_VOLUME || d->kind == DRAW_KIND_CLOUD;
+}
+
+static bool is_lit(const trip_document *d)
+{
+    return d->kind == DRAW_KIND_VOLUME || d->scene.lit;
+}
+
+static bool set_shading(trip_document *d, const char *value)
+{
+    static const char *const no_yes[] = { "0", "1", NULL };
+    int on = 0;
+    if (!choose(value, no_yes, &on))
+        return false;
+    trip_light_set_shading(&d->settings, is_lit(d), on);
+    return true;
+}
+
 static bool set_number(double *out, const char *value, double lo, double hi)
 {
     double number;
@@ -315,15 +335,23 @@ static bool set_switch(trip_document *d, const trip_effect_switch *e, const char
     return choose(value, no_yes, &on) && trip_effect_turn(e, on, &d->settings, trip_viewer_heat(d));
 }
 
+/* Whether the data can have one of the effects. */
+static bool has_effect(const trip_document *d, int bits)
+{
+    return d->kind != DRAW_KIND_OBJECTS && draw_settings_effects_of_kind(d->kind) & bits;
+}
+
 /* Sets an effect or a number of light.h. */
 static bool set_effect(trip_document *d, const char *name, const char *value)
 {
     double number;
     for (int i = 0; i < TRIP_EFFECT_SWITCHES; i++)
-        if (!strcmp(name, trip_effect_switches[i].name))
+        if (!strcmp(name, trip_effect_switches[i].name) &&
+            has_effect(d, trip_effect_switches[i].bit))
             return set_switch(d, &trip_effect_switches[i], value);
     for (int i = 0; i < TRIP_EFFECT_NUMBERS; i++)
-        if (!strcmp(name, trip_effect_numbers[i].name))
+        if (!strcmp(name, trip_effect_numbers[i].name) &&
+            has_effect(d, trip_effect_numbers[i].bits))
             return trip_text_to_double(value, &number) &&
                    trip_effect_number_set(&trip_effect_numbers[i], number, &d->settings);
     return false;
@@ -336,10 +364,12 @@ bool trip_session_set(trip_session *s, const char *name, const char *value)
     trip_document *d = trip_viewer_document(&s->viewer);
     if (d && !strcmp(name, "opacity"))
         good = set_number(&d->opacity_scale, value, 1e-3, 1e3);
-    else if (d && !d->kind && !strcmp(name, "light"))
+    else if (d && has_light(d) && !strcmp(name, "light"))
         good = set_light(d, value);
+    else if (d && has_light(d) && !strcmp(name, "shading"))
+        good = set_shading(d, value);
     else if (d)
-        good = (!d->kind && set_effect(d, name, value)) || set_setting(d, name, value);
+        good = set_effect(d, name, value) || set_setting(d, name, value);
     s->viewer.changed |= good;
     trip_viewer_tick(&s->viewer, 0);
     pthread_mutex_unlock(&s->lock);
@@ -445,6 +475,8 @@ static void add_switches(cJSON *root, const trip_document *d)
     for (int i = 0; i < TRIP_EFFECT_SWITCHES; i++) {
         const trip_effect_switch *e = &trip_effect_switches[i];
         const char *lacks = trip_effect_lacks(e, s, trip_viewer_heat(d));
+        if (!has_effect(d, e->bit))
+            continue;
         cJSON *to = cJSON_CreateObject();
         cJSON_AddStringToObject(to, "name", e->name);
         cJSON_AddStringToObject(to, "label", e->label);
@@ -460,6 +492,7 @@ static void add_light(cJSON *root, const trip_document *d)
 {
     const trip_light_control c = trip_light_control_of(&d->settings, &d->info);
     cJSON *light = cJSON_AddObjectToObject(root, "light");
+    cJSON_AddBoolToObject(light, "shading", trip_light_shades(&d->settings, is_lit(d)));
     cJSON_AddBoolToObject(light, "head", trip_light_is_head(&d->settings));
     cJSON_AddBoolToObject(light, "turns", c.turns);
     cJSON_AddNumberToObject(light, "round", c.round);
@@ -540,13 +573,12 @@ char *trip_session_status(trip_session *s)
     const draw_settings settings = d ? trip_viewer_settings(d) : s->viewer.settings;
     char effects[256];
     trip_effects_say(&settings, d ? trip_viewer_heat(d) : NULL, effects, sizeof effects);
-    const bool of_volume = d && !d->kind;
     cJSON_AddBoolToObject(root, "opened", d && d->opened);
     if (d && d->opened)
         add_bounds(root, d);
-    if (of_volume && d->opened)
+    if (d && d->opened && has_light(d))
         add_light(root, d);
-    if (of_volume)
+    if (d && d->kind != DRAW_KIND_OBJECTS)
         add_switches(root, d);
     if (d && d->kind)
         add_scene(root, d, &settings, &status);

@@ -124,6 +124,18 @@ void trip_light_set_turns(draw_settings *s, const triptych_info *info, const tri
         s->light.toward[2] = 1;
 }
 
+bool trip_light_shades(const draw_settings *s, bool lit)
+{
+    return !s->light.no_shading && (lit || s->light.kind != TRIPTYCH_LIGHT_DEFAULT);
+}
+
+void trip_light_set_shading(draw_settings *s, bool lit, bool shading)
+{
+    s->light.no_shading = !shading;
+    if (shading && !lit && s->light.kind == TRIPTYCH_LIGHT_DEFAULT)
+        s->light.kind = TRIPTYCH_LIGHT_HEAD;
+}
+
 /* ---- effects ---- */
 
 const trip_effect_switch trip_effect_switches[TRIP_EFFECT_SWITCHES] = {
@@ -132,6 +144,7 @@ const trip_effect_switch trip_effect_switches[TRIP_EFFECT_SWITCHES] = {
     { TRIPTYCH_EFFECT_CUEING, "cueing", "Depth cueing", "depth cueing" },
     { TRIPTYCH_EFFECT_AUTO, "auto", "Automatic effects", "effects chosen by the kind of data" },
     { TRIPTYCH_EFFECT_EMISSION, "emission", "Emission", "emission" },
+    { TRIPTYCH_EFFECT_EDL, "edl", "Eye-dome lighting", "eye-dome lighting" },
 };
 
 #define AT(member) offsetof(draw_settings, effects.member)
@@ -149,6 +162,10 @@ const trip_effect_number trip_effect_numbers[TRIP_EFFECT_NUMBERS] = {
       HOTTEST - 1, 1, 0 },
     { TRIPTYCH_EFFECT_EMISSION, "hottest", "Maximum temperature", "K", AT(kelvin[1]), false, 1,
       HOTTEST, 1, DEFAULT_HOTTEST },
+    { TRIPTYCH_EFFECT_EDL, "edl-strength", "Dome strength", "", AT(edl_strength), false, 0.01, 5,
+      0.01, 0.4 },
+    { TRIPTYCH_EFFECT_EDL, "edl-radius", "Dome radius", "px", AT(edl_radius_px), false, 1, 16, 0.1,
+      1.4 },
 };
 
 const char *trip_effect_lacks(const trip_effect_switch *effect, const draw_settings *s,

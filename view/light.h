@@ -40,6 +40,10 @@ void trip_light_set_head(draw_settings *s, bool head);
  * the same, except for a light that leaves its position. */
 void trip_light_set_turns(draw_settings *s, const triptych_info *info, const trip_navigation *n,
                           bool turns);
+/* Returns whether light shades the data. `lit` tells whether the default light does, as in volumes;
+ * other clouds are lit if a light is given. */
+bool trip_light_shades(const draw_settings *s, bool lit);
+void trip_light_set_shading(draw_settings *s, bool lit, bool shading);
 /* Returns whether the light is at the eye. The default is another light with shadows. */
 static inline bool trip_light_is_head(const draw_settings *s)
 {
@@ -51,7 +55,7 @@ void trip_effects_say(const draw_settings *s, const char *heat, char *text, size
 
 /* ---- effects as controls ---- */
 
-enum { TRIP_EFFECT_SWITCHES = 5, TRIP_EFFECT_NUMBERS = 5 };
+enum { TRIP_EFFECT_SWITCHES = 6, TRIP_EFFECT_NUMBERS = 7 };
 
 typedef struct trip_effect_switch {
     int bit;                          /* of triptych_effects.which */
@@ -70,6 +74,11 @@ typedef struct trip_effect_number {
 extern const trip_effect_switch trip_effect_switches[TRIP_EFFECT_SWITCHES];
 extern const trip_effect_number trip_effect_numbers[TRIP_EFFECT_NUMBERS];
 
+/* Returns whether the kind of data can have the effect. */
+static inline bool trip_effect_applies(const trip_effect_switch *effect, int kind)
+{
+    return (draw_settings_effects_of_kind(kind) & effect->bit) != 0;
+}
 /* Returns why the effect cannot run, as text for people, or NULL if it can. `heat` is the heat data
  * set or NULL. */
 const char *trip_effect_lacks(const trip_effect_switch *effect, const draw_settings *s,

@@ -522,7 +522,10 @@ bool draw_effect_numbers(trip_panel *p, draw_settings *s, const trip_effect_swit
     bool changed = false;
     for (const trip_effect_number &n : trip_effect_numbers) {
         double value = trip_effect_number_get(&n, s);
-        const char *format = n.unit[0] ? "%.0f K" : n.whole ? "%.0f" : "%.2f";
+        const char *format = !std::strcmp(n.unit, "K") ? "%.0f K"
+                             : n.unit[0]               ? "%.1f px"
+                             : n.whole                 ? "%.0f"
+                                                       : "%.2f";
         if (trip_effect_number_is_below(&n, &below, s) &&
             slide(p, n.label, &value, n.lo, n.hi, format))
             changed |= trip_effect_number_set(&n, n.whole ? std::round(value) : value, s);
@@ -538,6 +541,8 @@ bool draw_effects(trip_panel *p, trip_document *d)
     char text[256];
     bool changed = false;
     for (const trip_effect_switch &e : trip_effect_switches) {
+        if (!trip_effect_applies(&e, d->kind))
+            continue;
         const char *lacks = trip_effect_lacks(&e, s, heat);
         bool on = (s->effects.which & e.bit) != 0;
         if (lacks) {
@@ -558,16 +563,19 @@ bool draw_effects(trip_panel *p, trip_document *d)
 bool draw_light(trip_panel *p, trip_document *d)
 {
     draw_settings *s = &d->settings;
-    bool changed = false, shading = !s->light.no_shading, head = trip_light_is_head(s);
-    changed |= check(p, "Shading", &shading);
-    s->light.no_shading = !shading;
+    const bool lit = d->kind == DRAW_KIND_VOLUME || d->scene.lit;
+    bool changed = false, shading = trip_light_shades(s, lit), head = trip_light_is_head(s);
+    if (check(p, "Shading", &shading)) {
+        trip_light_set_shading(s, lit, shading);
+        changed = true;
+    }
     if (check(p, "Light from the eye", &head)) { // also lights effects
         trip_light_set_head(s, head);
         changed = true;
     }
     if (!head)
         changed |= draw_light_position(p, d);
-    return draw_background(p, s) || changed;
+    return changed;
 }
 
 // Settings of interpolation and of the choice by error.
@@ -1020,9 +1028,11 @@ void draw_document(trip_panel *p, trip_viewer *v, trip_document *d)
         v->changed |= draw_scene(p, d);
     if (d->kind == DRAW_KIND_VOLUME && section(p, "Transfer function"))
         draw_function(p, v, d);
-    if (d->kind == DRAW_KIND_VOLUME && section(p, "Light"))
+    if ((d->kind == DRAW_KIND_VOLUME || d->kind == DRAW_KIND_CLOUD) && section(p, "Light")) {
         v->changed |= draw_light(p, d);
-    if (d->kind == DRAW_KIND_VOLUME && section(p, "Effects", d->settings.effects.which != 0))
+        v->changed |= d->kind == DRAW_KIND_VOLUME && draw_background(p, &d->settings);
+    }
+    if (d->kind != DRAW_KIND_OBJECTS && section(p, "Effects", d->settings.effects.which != 0))
         v->changed |= draw_effects(p, d);
     if (section(p, "Quality"))
         v->changed |= draw_quality(p, d);

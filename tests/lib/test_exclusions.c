@@ -117,7 +117,7 @@ static void settings_of_another_kind_of_data_are_refused_and_dropped(void **stat
         draw_kind kind;
         const char *says, *kept;
     } cases[] = {
-        { "--effects occlusion --order lists", DRAW_KIND_SCENE, "--effects: must be edl, auto",
+        { "--effects occlusion --order lists", DRAW_KIND_SCENE, "--effects: must be edl or none",
           " --order lists" },
         { "--effects edl,cueing --edl-radius 2", DRAW_KIND_CLOUD, "--effects: must be edl, auto",
           " --effects edl --edl-radius 2" },

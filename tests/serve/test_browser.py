@@ -159,8 +159,8 @@ class InBrowser(Page):
             ("[data-set=opacity]", "value = '-0.5'"), ("[data-set=background]", "value = '#203040'"),
             ("#parallel", "checked = true"), ("#parallel", "checked = false"), ("#clip", "checked = true"),
             ("#box input", "value = '12'"), ("#clip", "checked = false"),
-            ("[data-set=no-shading]", "checked = false"),
-            ("[data-set=no-shading]", "checked = true"), ("#head", "checked = false"),
+            ("#shading", "checked = false"),
+            ("#shading", "checked = true"), ("#head", "checked = false"),
             ("#round", "value = '90'"), ("#up", "value = '-40'"), ("#head", "checked = true"),
             ("[data-set=classify]", "value = 'post'"), ("[data-set=classify]", "value = 'pre'"),
             ("[data-set=h]", "value = '0.1'"), ("[data-set=method]", "value = 'axis'"),
@@ -335,7 +335,7 @@ class SceneInBrowser(Page):
         self.browser.value("panel.open = document.getElementById('papers').open = true")
         self.ready("#order")
         shown = {"Order", "Footprint", "Harmonics", "Opacity", "Background", "Early termination", "Parallel view",
-                 "Clip box"}
+                 "Clip box", "Eye-dome lighting"}
         for order, more in ("depth", set()), ("lists", {"Method", "Blend start (h)"}), ("depth", set()):
             self.choose("#order", f"value = '{order}'")
             for _ in range(500):
@@ -376,6 +376,35 @@ class SceneInBrowser(Page):
         for query, value in ("#order", "value = 'depth'"), ("#clip", "checked = false"), ("#parallel", "checked = false"):
             self.choose(query, value)
         self.exact()
+
+
+class CloudInBrowser(Page):
+    KEPT = ["--radius=2x"]
+
+    @staticmethod
+    def write():
+        shutil.copy(os.path.join(program.DATASETS, "lamp.ply"), "v.ply")
+        return "v.ply"
+
+    def test_each_control_of_light_changes_the_picture(self):
+        before = self.exact()
+        self.browser.value("panel.open = true")
+        self.ready("#shading")
+        self.assertFalse(self.browser.value("shading.checked"))  # colours of a camera
+        for query, value in (
+            ("#edl", "checked = true"), ("#edl-strength", "value = '2'"), ("#edl-radius", "value = '4'"),
+            ("#shading", "checked = true"), ("#head", "checked = false"), ("#round", "value = '90'"),
+            ("#up", "value = '-40'"), ("#edl", "checked = false"), ("#shading", "checked = false"),
+        ):
+            self.choose(query, value)
+            before = self.exact(before)
+        self.choose("#shading", "checked = true")
+        self.choose("#edl", "checked = true")
+        self.exact(before)
+        status = self.status()
+        self.assertEqual(status["effects"], "eye-dome lighting")
+        self.assertIn("--effects edl --edl-strength 2 --edl-radius 4", status["camera"])
+        self.assertIn("--light ", status["camera"])
 
 
 if __name__ == "__main__":

@@ -286,12 +286,12 @@ class Serve(program.ProgramTest):
         self.serve(*(arguments or ["scene.trip"]))
         self.do("resize 120 90")
 
-    def scene_picture(self, after=0, data="scene.trip"):
+    def scene_picture(self, after=0, data="scene.trip", options=()):
         """Waits for the full picture, and expects the bits of `render`."""
         picture, number, camera = self.whole_picture(after)
         while picture.shape[:2] != (90, 120):  # drawn before the change of size
             picture, number, camera = self.whole_picture(number)
-        self.works("render", data, "-o", "r.png", *shlex.split(camera))
+        self.works("render", data, "-o", "r.png", *options, *shlex.split(camera))
         with open("r.png", "rb") as f:
             expected = read_png(f.read())
         numpy.testing.assert_array_equal(picture[..., :3], expected[..., :3], camera)
@@ -333,11 +333,12 @@ class Serve(program.ProgramTest):
         self.assertEqual(self.entries("kernel"), ["", "exact", "ewa"])
         self.assertEqual(self.entries("sh"), ["", "0", "1"])
         status = self.status()
-        self.assertEqual({"light", "switches"} & set(status), set())
+        self.assertNotIn("light", status)
+        self.assertEqual([e["name"] for e in status["switches"]], ["edl"])
         self.assertEqual((status["function"], status["effects"]), ("", ""))
         applies = status["scene"]["applies"]
         self.assertIn("background", applies)
-        for name in "h", "method", "classify", "quality", "no-shading", "interpolation", "show", "effects":
+        for name in "h", "method", "classify", "quality", "no-shading", "interpolation", "show":
             self.assertNotIn(name, applies)
 
     def test_what_does_not_apply_to_a_scene_is_refused(self):
@@ -364,6 +365,31 @@ class Serve(program.ProgramTest):
         self.serve_scene("scene.ply", "--order=lists", "--sh=1")
         _, _, camera = self.scene_picture(data="scene.ply")
         self.assertIn("--order lists --sh 1", camera)
+
+    def test_light_and_effects_of_a_cloud_equal_render(self):
+        cloud, brick = os.path.join(program.DATASETS, "lamp.ply"), ("--radius=2x", "--k=8")
+        self.serve_scene(cloud, *brick)
+        before, number, _ = self.scene_picture(0, cloud, brick)
+        self.assertFalse(self.status()["light"]["shading"])
+        for name, value, says in (
+            ("edl", "1", "--effects edl"), ("edl-strength", "2", "--edl-strength 2"),
+            ("edl-radius", "3", "--edl-radius 3"), ("shading", "1", "--light head"), ("light", "60,20", "--light 0.8"),
+            ("light", "60,20,0.4", "--light point:"), ("edl", "0", "--light point:"),
+            ("shading", "0", "--no-shading"), ("auto", "1", "--effects auto"),
+        ):
+            self.assertEqual(self.ask("/set", "POST", name=name, value=value)[0], 204, name)
+            picture, number, camera = self.scene_picture(number, cloud, brick)
+            self.assertIn(says, camera)
+            self.assertTrue((picture != before).any(), name)
+            before = picture
+        self.assertEqual([e["name"] for e in self.status()["switches"]], ["auto", "edl"])
+        for name, value in ("shadows", "1"), ("cueing", "0.5"), ("shading", "2"), ("edl-radius", "0.5"):
+            self.assertEqual(self.ask("/set", "POST", name=name, value=value)[0], 400, name)
+        self.tearDown()
+        for command in "serve", "view":
+            for name, says in ("v.trip", "is a data set"), ("v.nhdr", "applies to clouds"), ("scene.ply", "applies to clouds"):
+                self.leaves_nothing(2, command, name, "--color=height", says=says)
+        self.serve("v.trip")
 
     def test_a_fault_of_a_scene_is_a_line_on_stderr(self):
         self.serve_scene()

@@ -180,7 +180,27 @@ static void every_effect_has_its_own_switch(void **state)
     }
     assert_int_equal(all, TRIPTYCH_EFFECT_SHADOWS | TRIPTYCH_EFFECT_OCCLUSION |
                               TRIPTYCH_EFFECT_CUEING | TRIPTYCH_EFFECT_AUTO |
-                              TRIPTYCH_EFFECT_EMISSION);
+                              TRIPTYCH_EFFECT_EMISSION | TRIPTYCH_EFFECT_EDL);
+}
+
+static void colours_of_a_camera_are_lit_once_shading_is_switched_on(void **state)
+{
+    (void)state;
+    draw_settings s = { 0 };
+    assert_true(trip_light_shades(&s, true));
+    assert_false(trip_light_shades(&s, false));
+    trip_light_set_shading(&s, false, true);
+    assert_int_equal(s.light.kind, TRIPTYCH_LIGHT_HEAD);
+    assert_true(trip_light_shades(&s, false));
+    trip_light_set_head(&s, false);
+    for (int on = 0; on < 2; on++) {
+        trip_light_set_shading(&s, false, on);
+        assert_int_equal(trip_light_shades(&s, false), on);
+        assert_int_equal(s.light.kind, TRIPTYCH_LIGHT_VIEW);
+    }
+    s = (draw_settings){ 0 };
+    trip_light_set_shading(&s, true, true);
+    assert_int_equal(s.light.kind, TRIPTYCH_LIGHT_DEFAULT);
 }
 
 static void effects_without_light_or_heat_cannot_be_turned_on(void **state)
@@ -286,6 +306,7 @@ int main(void)
         cmocka_unit_test(shadows_take_the_default_light_from_the_eye),
         cmocka_unit_test(active_effects_are_named_in_words),
         cmocka_unit_test(every_effect_has_its_own_switch),
+        cmocka_unit_test(colours_of_a_camera_are_lit_once_shading_is_switched_on),
         cmocka_unit_test(effects_without_light_or_heat_cannot_be_turned_on),
         cmocka_unit_test(numbers_of_effects_stay_within_their_bounds),
         cmocka_unit_test(a_number_of_several_effects_is_below_only_one),

@@ -555,11 +555,11 @@ class View(program.ProgramTest):
                   "scene.trip", "noise.trip")
         scene, lists, volume = (set(self.status(f"{n}.json")["controls"]) for n in ("scene", "lists", "volume"))
         of_volumes = {"Transfer function", "Function editor", "Preset", "Light", "Shading", "Light from the eye",
-                      "Effects", "Quality preset", "Classification", "Interpolation", "Samples per sheet",
+                      "Quality preset", "Classification", "Interpolation", "Samples per sheet",
                       "Debug view", "Probe"}
         of_scenes = {"Scene", "Order", "Footprint", "Harmonics"}
         of_both = {"Opacity", "Background", "Antialiasing", "Early termination", "Clipping", "Box", "Axes",
-                   "Scale bar", "Parallel", "Fit", "Front"}
+                   "Effects", "Scale bar", "Parallel", "Fit", "Front"}
         self.assertEqual(scene & of_volumes, set())
         self.assertEqual(volume & of_scenes, set())
         for controls in scene, lists, volume:
@@ -587,6 +587,20 @@ class View(program.ProgramTest):
         self.assertGreater(numpy.abs(lit - plain).max(), 0.1)
         self.view("wait\npicture seen.exr\nstatus status.json\n", cloud, "--light=1,0.2,0")
         self.expect_render("seen", "status.json", cloud, ["--light=1,0.2,0"])
+
+    def test_each_control_of_a_cloud_draws_the_picture_of_render(self):
+        cloud, brick = os.path.join(program.DATASETS, "lamp.ply"), ["--radius=1.5x", "--k=8"]
+        controls = ["Shading", "Light from the eye", "Light azimuth", "Light elevation",
+                    "Effects\nclick 0.5 Eye-dome lighting", "Dome strength", "Dome radius", "Shading"]
+        script = "wait\npicture 0.exr\nstatus 0.json\n" + "".join(
+            f"click 0.2 {text}\nwait\npicture {i + 1}.exr\nstatus {i + 1}.json\n"
+            for i, text in enumerate(controls))
+        self.each_changes(script, controls, cloud, *brick)
+        for i in range(len(controls) + 1):
+            self.expect_render(i, f"{i}.json", cloud, brick)
+        self.assertIn("--effects edl --edl-strength", self.status(f"{i}.json")["camera"])
+        with self.assertRaises(AssertionError):  # the options of bricking count
+            self.expect_render(0, "0.json", cloud)
 
     def test_scenes_with_y_down_stand_upright(self):
         """The red Gaussian has the least y, which is up."""
