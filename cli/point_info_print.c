@@ -21,6 +21,7 @@ static const struct {
     { TRIPTYCH_POINT_RETURNS, "returns" },
     { TRIPTYCH_POINT_TIME, "gps time" },
     { TRIPTYCH_POINT_SCAN, "scan" },
+    { TRIPTYCH_POINT_UNCERTAINTY, "uncertainty" },
 };
 
 enum { ATTRIBUTES = sizeof attributes / sizeof *attributes };

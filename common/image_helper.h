@@ -40,8 +40,10 @@ enum trip_image_task {
      * format. numbers: width, height, depth (trip_image_depth), trip_image_form, JPEG quality. Rows
      * of floats follow from the top, RGBA or distances. The reply comes after the rows. */
     TRIP_IMAGE_WRITE = 1,
-    /* Reads a picture from a file. numbers: bytes the helper may use. Reply data: trip_image_size,
-     * then float RGBA rows. */
+    /* Reads a picture from a file. numbers: bytes the helper may use; trip_image_form. Reply data
+     * of RGBA: trip_image_size, then float RGBA rows. Reply data of DISTANCES:
+     * trip_image_distances, then one float a pixel, as stored. NaN stands for integers of 0 and of
+     * the greatest number of their type, which mean no distance. */
     TRIP_IMAGE_READ,
     /* Opens a stack of slices. numbers: bytes the helper may use; 1 to accept missing slices; the
      * number of the DICOM series, or 0; the time; the channel. Reply data: trip_image_stack, then
@@ -87,6 +89,11 @@ typedef struct trip_image_reply {
 typedef struct trip_image_size {
     int64_t width, height;
 } trip_image_size;
+
+typedef struct trip_image_distances {
+    int64_t width, height;
+    int64_t integers; /* 1: the file stores integers; 0: floats */
+} trip_image_distances;
 
 typedef struct trip_image_stack {
     int64_t dims[3];

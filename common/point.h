@@ -15,6 +15,7 @@ enum {
     TRIP_POINT_RETURNS = 32, /* number of the return, and returns of the pulse */
     TRIP_POINT_TIME = 64,
     TRIP_POINT_SCAN = 128, /* several scans, or one with a pose */
+    TRIP_POINT_UNCERTAINTY = 256,
 };
 
 typedef struct trip_point {
@@ -25,6 +26,8 @@ typedef struct trip_point {
     float colour[3]; /* 0 to 1, display colours */
     float intensity; /* as in the file */
     uint32_t scan;   /* index of the scan */
+    /* Standard deviation of the distance from the scanner, and half the width of a pixel there. */
+    float uncertainty, footprint;
     uint8_t classification, return_number, returns;
 } trip_point;
 

@@ -119,6 +119,14 @@ class Session
     {
         trip_sandbox_limit_memory((uint64_t)request.numbers[0]);
         int width, height;
+        if (request.numbers[1] == TRIP_IMAGE_FORM_DISTANCES) {
+            bool integers;
+            const std::vector<float> z = trip_distances_read(path, width, height, integers);
+            const trip_image_distances head = { width, height, integers };
+            reply_data(sizeof head + z.size() * sizeof(float));
+            trip_connection_send(&head, sizeof head);
+            return trip_connection_send(z.data(), z.size() * sizeof(float));
+        }
         std::vector<float> rgba = trip_picture_read(path, width, height);
         trip_image_size size = { width, height };
         reply_data(sizeof size + rgba.size() * sizeof(float));

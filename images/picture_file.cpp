@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdint>
 #include <cstring>
+#include <limits>
 #include <memory>
 
 #include <strings.h>
@@ -229,6 +230,29 @@ void to_rgba(const float *from, int channels, bool premultiplied, float rgba[4])
     rgba[3] = alpha;
 }
 
+/* Returns the channel that holds distances, or -1. */
+int channel_of_distances(const OIIO::ImageSpec &spec, bool exr)
+{
+    for (int c = 0; c < spec.nchannels; c++) {
+        const char *name = std::strrchr(spec.channelnames[(size_t)c].c_str(), '.');
+        name = name ? name + 1 : spec.channelnames[(size_t)c].c_str();
+        if (strcasecmp(name, "Z") == 0 || strcasecmp(name, "depth") == 0)
+            return c;
+    }
+    return spec.nchannels <= 2 || exr ? 0 : -1;
+}
+
+/* Converts stored integers to floats. */
+template <typename T>
+void take_integers(const std::vector<char> &row, int channels, int c, int width, float *to)
+{
+    for (int x = 0; x < width; x++) {
+        T v;
+        std::memcpy(&v, &row[((size_t)x * (size_t)channels + (size_t)c) * sizeof v], sizeof v);
+        to[x] = v == 0 || v == std::numeric_limits<T>::max() ? NAN : (float)v;
+    }
+}
+
 } // namespace
 
 void trip_picture_write(const trip_picture &p, const trip_picture_row &next_row)
@@ -265,4 +289,51 @@ std::vector<float> trip_picture_read(const std::string &path, int &width, int &h
     width = spec.width;
     height = spec.height;
     return rgba;
+}
+
+std::vector<float> trip_distances_read(const std::string &path, int &width, int &height,
+                                       bool &integers)
+{
+    OIIO::ImageSpec hints;
+    hints.attribute("oiio:UnassociatedAlpha", 1); /* keeps the stored values */
+    auto in = OIIO::ImageInput::open(path, &hints);
+    if (!in)
+        throw trip_slice_error(path, trim(OIIO::geterror()));
+    const OIIO::ImageSpec spec = in->spec();
+    const int channel = channel_of_distances(spec, std::strcmp(in->format_name(), "openexr") == 0);
+    if (spec.depth > 1 || spec.width < 1 || spec.height < 1 || spec.nchannels < 1 || channel < 0)
+        throw trip_slice_error(path, "has " + std::to_string(spec.nchannels) +
+                                         " channels; a depth image has one");
+    const OIIO::TypeDesc stored((OIIO::TypeDesc::BASETYPE)spec.format.basetype);
+    const OIIO::TypeDesc type = stored == OIIO::TypeDesc::UINT8 ||
+                                        stored == OIIO::TypeDesc::UINT16 ||
+                                        stored == OIIO::TypeDesc::UINT32
+                                    ? stored
+                                    : OIIO::TypeDesc(OIIO::TypeDesc::FLOAT);
+    if (type == OIIO::TypeDesc::FLOAT && !stored.is_floating_point())
+        throw trip_slice_error(path, std::string("stores values of the type ") + stored.c_str() +
+                                         "; a depth image has unsigned integers or floats");
+    std::vector<char> row((size_t)spec.width * (size_t)spec.nchannels * type.size());
+    std::vector<float> z((size_t)spec.width * (size_t)spec.height);
+    for (int y = 0; y < spec.height; y++) {
+        float *to = &z[(size_t)y * (size_t)spec.width];
+        if (!in->read_scanline(y + spec.y, 0, type, row.data()))
+            throw trip_slice_error(path, trim(in->geterror()));
+        if (type == OIIO::TypeDesc::UINT8)
+            take_integers<uint8_t>(row, spec.nchannels, channel, spec.width, to);
+        else if (type == OIIO::TypeDesc::UINT16)
+            take_integers<uint16_t>(row, spec.nchannels, channel, spec.width, to);
+        else if (type == OIIO::TypeDesc::UINT32)
+            take_integers<uint32_t>(row, spec.nchannels, channel, spec.width, to);
+        else
+            for (int x = 0; x < spec.width; x++)
+                std::memcpy(
+                    &to[x],
+                    &row[((size_t)x * (size_t)spec.nchannels + (size_t)channel) * sizeof(float)],
+                    sizeof(float));
+    }
+    width = spec.width;
+    height = spec.height;
+    integers = type != OIIO::TypeDesc::FLOAT;
+    return z;
 }

@@ -28,4 +28,10 @@ void trip_picture_write(const trip_picture &picture, const trip_picture_row &nex
  * for all formats. */
 std::vector<float> trip_picture_read(const std::string &path, int &width, int &height);
 
+/* Returns the distances of a depth image as stored, and whether they are integers. They are the
+ * channel named Z or depth, or the only one besides alpha, or the first of an EXR file. Integers of
+ * 0 and of the greatest number of their type become NaN. */
+std::vector<float> trip_distances_read(const std::string &path, int &width, int &height,
+                                       bool &integers);
+
 #endif

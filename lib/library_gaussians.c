@@ -110,13 +110,18 @@ static int add_files(trip_source *s, const char *path)
     return status;
 }
 
+static int add_part(void *source, const char *path)
+{
+    return trip_source_add(source, path);
+}
+
 int trip_context_find_files(trip_source *s, const char *path, const trip_volume_params *params)
 {
     const bool is_scene = trip_gaussian_file_is(path);
     if (!is_scene && !trip_point_file_is(path))
         return trip_source_find(s, path, params);
     *s = (trip_source){ .format = is_scene ? "gaussians" : "points" };
-    const int status = add_files(s, path);
+    const int status = is_scene ? add_files(s, path) : trip_point_file_list(path, add_part, s);
     if (status)
         trip_source_free(s);
     return status;

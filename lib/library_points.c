@@ -22,7 +22,8 @@ _Static_assert((int)TRIPTYCH_POINT_NORMAL == (int)TRIP_POINT_NORMAL &&
                    (int)TRIPTYCH_POINT_CLASSIFICATION == (int)TRIP_POINT_CLASSIFICATION &&
                    (int)TRIPTYCH_POINT_RETURNS == (int)TRIP_POINT_RETURNS &&
                    (int)TRIPTYCH_POINT_TIME == (int)TRIP_POINT_TIME &&
-                   (int)TRIPTYCH_POINT_SCAN == (int)TRIP_POINT_SCAN,
+                   (int)TRIPTYCH_POINT_SCAN == (int)TRIP_POINT_SCAN &&
+                   (int)TRIPTYCH_POINT_UNCERTAINTY == (int)TRIP_POINT_UNCERTAINTY,
                "the library's attributes are those of point.h");
 
 static void copy_scans(const trip_point_info *info, triptych_points *out)

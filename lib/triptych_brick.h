@@ -353,7 +353,8 @@ enum {
     TRIPTYCH_POINT_CLASSIFICATION = 16,
     TRIPTYCH_POINT_RETURNS = 32,
     TRIPTYCH_POINT_TIME = 64,
-    TRIPTYCH_POINT_SCAN = 128, /* several scans, or one with a pose */
+    TRIPTYCH_POINT_SCAN = 128,        /* several scans, or one with a pose */
+    TRIPTYCH_POINT_UNCERTAINTY = 256, /* of distances */
 };
 
 /* A cloud of points, such as a laser scan. */

@@ -12,6 +12,7 @@
 
 #include "byte_stream.h"
 #include "point_file_internal.h"
+#include "range_frames.h"
 #include "report.h"
 
 enum { HEAD_BYTES = 1 << 16, BATCH = 1024, SAMPLED_POINTS = 1 << 16 };
@@ -22,6 +23,7 @@ static const trip_point_reader *const readers[] = {
     &trip_read_pcd,
     &trip_read_e57,
     &trip_read_vdb_points,
+    &trip_read_range,
     /* without a magic number: */
     &trip_read_ptx,
     &trip_read_pts,
@@ -83,7 +85,9 @@ trip_point_scan *trip_point_add_scan(trip_point_file *f)
 /* Sets *out to the reader of a file, or to NULL. */
 static int choose(const char *path, bool quiet, const trip_point_reader **out)
 {
-    *out = NULL;
+    *out = trip_range_is_folder(path) ? &trip_read_range : NULL;
+    if (*out)
+        return 0;
     unsigned char *bytes = malloc(HEAD_BYTES);
     if (!bytes)
         return quiet ? TRIP_ERROR : trip_fail(TRIP_ERROR, "read", path, "out of memory");
@@ -106,6 +110,15 @@ bool trip_point_file_is(const char *path)
 {
     const trip_point_reader *reader;
     return choose(path, true, &reader) == 0 && reader;
+}
+
+int trip_point_file_list(const char *path, int (*add)(void *user, const char *file), void *user)
+{
+    const trip_point_reader *reader;
+    const int status = choose(path, false, &reader);
+    if (status < 0)
+        return status;
+    return reader == &trip_read_range ? trip_range_frames_list(path, add, user) : add(user, path);
 }
 
 /* Sets the factor from the colours of the reader to 0 to 1. */
@@ -221,6 +234,8 @@ static bool check(trip_point_file *f, trip_point *p)
     p->radius = isfinite(p->radius) && p->radius > 0 ? p->radius : 0;
     p->intensity = isfinite(p->intensity) ? p->intensity : 0;
     p->gps_time = isfinite(p->gps_time) ? p->gps_time : 0;
+    p->uncertainty = isfinite(p->uncertainty) && p->uncertainty > 0 ? p->uncertainty : 0;
+    p->footprint = isfinite(p->footprint) && p->footprint > 0 ? p->footprint : 0;
     return true;
 }
 
@@ -255,6 +270,8 @@ void trip_point_file_print_notes(const trip_point_file *f)
 typedef struct seen {
     trip_point_info info;
     float largest; /* of the colours, unscaled */
+    uint64_t uncertain;
+    double certainty; /* sum of 1 / uncertainty */
 } seen;
 
 /* Conditions are faster than fmin() and fmax() here. All values are finite. */
@@ -274,6 +291,10 @@ static void see(seen *s, const trip_point *p)
     i->time_lo = first || t < i->time_lo ? t : i->time_lo;
     i->time_hi = first || t > i->time_hi ? t : i->time_hi;
     i->classes[p->classification]++;
+    if (p->uncertainty > 0) {
+        s->uncertain++;
+        s->certainty += 1 / (double)p->uncertainty;
+    }
     i->returns_max = p->returns > i->returns_max ? p->returns : i->returns_max;
 }
 
@@ -334,6 +355,7 @@ static void settle(trip_point_file *f, const seen *s)
     i->time_hi = s->info.time_hi;
     memcpy(i->classes, s->info.classes, sizeof i->classes);
     i->returns_max = s->info.returns_max;
+    i->uncertainty = s->uncertain > 0 ? (double)s->uncertain / s->certainty : 0;
     if (i->intensity_lo == 0 && i->intensity_hi == 0)
         i->attributes &= ~(unsigned)TRIP_POINT_INTENSITY;
     if (f->left_out > 0)
@@ -391,6 +413,8 @@ int trip_point_file_survey(trip_point_file *f)
 static const char *usual_up(const trip_point_info *info)
 {
     static const char *const z_up[] = { "LAS", "LAZ", "COPC", "E57", "PTS", "PTX", "XYZ" };
+    if (*info->up)
+        return info->up;
     for (size_t i = 0; i < sizeof z_up / sizeof *z_up; i++)
         if (!strncmp(info->format, z_up[i], strlen(z_up[i])))
             return "z";

@@ -1,5 +1,6 @@
 /* Reads the points of a cloud from a file, in the order of the file and in bounded memory. The
- * content and the name of a file tell its format. One thread at a time. */
+ * content and the name of a file tell its format. A cloud of range images may be a folder. One
+ * thread at a time. */
 #ifndef TRIP_POINT_FILE_H
 #define TRIP_POINT_FILE_H
 
@@ -38,6 +39,7 @@ typedef struct trip_point_info {
      * poses and grids has none. The array may move with every read. */
     uint32_t scan_count;
     const trip_point_scan *scans;
+    char up[3]; /* the axis that points up: "y", "-y" or "z"; "": by the custom of the format */
     char extras[TRIP_POINT_TEXT_BYTES];   /* further attributes, by names; or "" */
     char comments[TRIP_POINT_TEXT_BYTES]; /* of the program that wrote the file; or "" */
     /* Choices and faults of the file, one sentence each. */
@@ -53,6 +55,7 @@ typedef struct trip_point_info {
     double time_lo, time_hi;
     uint64_t classes[256]; /* points of each classification */
     unsigned returns_max;
+    double uncertainty; /* harmonic mean of the points' uncertainties above 0; 0: none */
 } trip_point_info;
 
 typedef struct trip_point_file trip_point_file;
@@ -60,6 +63,9 @@ typedef struct trip_point_file trip_point_file;
 /* Returns whether a file is a cloud of points that trip_point_file_open() reads. A damaged cloud
  * counts, and so does a mesh in PLY. Reports nothing. */
 bool trip_point_file_is(const char *path);
+
+/* Calls `add` with the path of each file of a cloud, until it returns a negative number. */
+int trip_point_file_list(const char *path, int (*add)(void *user, const char *file), void *user);
 
 /* Opens a cloud. The failure of a file that is no cloud is reported too. */
 int trip_point_file_open(const char *path, trip_point_file **out);

@@ -46,7 +46,7 @@ struct trip_point_file {
 };
 
 extern const trip_point_reader trip_read_point_ply, trip_read_las, trip_read_pcd, trip_read_ptx,
-    trip_read_pts, trip_read_xyz, trip_read_e57, trip_read_vdb_points;
+    trip_read_pts, trip_read_xyz, trip_read_e57, trip_read_vdb_points, trip_read_range;
 
 /* Marks a point that is left out. */
 void trip_point_drop(trip_point *p);

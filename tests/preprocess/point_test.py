@@ -13,7 +13,8 @@ except ImportError:
 
 PRINT = os.environ["TRIP_PRINT_POINTS"]
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
-NORMAL, RADIUS, COLOUR, INTENSITY, CLASSIFICATION, RETURNS, TIME, SCAN = (1 << i for i in range(8))
+NORMAL, RADIUS, COLOUR, INTENSITY, CLASSIFICATION, RETURNS, TIME, SCAN, UNCERTAINTY = (
+    1 << i for i in range(9))
 
 
 class Read:
@@ -23,10 +24,11 @@ class Read:
         made = subprocess.run([PRINT, path], capture_output=True)
         self.code = made.returncode
         self.lines = made.stderr.decode().splitlines()
-        v = np.frombuffer(made.stdout, dtype="<f8").reshape(-1, 16)
+        v = np.frombuffer(made.stdout, dtype="<f8").reshape(-1, 18)
         self.position, self.normal, self.radius, self.colour = v[:, :3], v[:, 3:6], v[:, 6], v[:, 7:10]
         self.intensity, self.scan, self.classification = v[:, 10], v[:, 11], v[:, 12]
         self.return_number, self.returns, self.time = v[:, 13], v[:, 14], v[:, 15]
+        self.uncertainty, self.footprint = v[:, 16], v[:, 17]
         if self.code:
             return
         (self.format, points, attributes, left_out, empty, self.extras,

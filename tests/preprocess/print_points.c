@@ -1,22 +1,23 @@
-/* Writes the points of a file to the standard output, as 16 doubles each: position, normal, radius,
- * colour, intensity, scan, classification, return, returns, time. A second pass, in other portions,
- * must give the same. Then writes a line with the info to stderr. */
+/* Writes the points of a file to the standard output, as 18 doubles each: position, normal, radius,
+ * colour, intensity, scan, classification, return, returns, time, uncertainty, footprint. A second
+ * pass, in other portions, must give the same. Then writes a line with the info to stderr. */
 #include <stdbool.h>
 #include <stdio.h>
 #include <string.h>
 
 #include "point_file.h"
 
-enum { DOUBLES = 16, FIRST = 1000, SECOND = 7 };
+enum { DOUBLES = 18, FIRST = 1000, SECOND = 7 };
 
 static void write_one(const trip_point *p, FILE *to)
 {
-    const double v[DOUBLES] = { p->position[0],       p->position[1],       p->position[2],
-                                (double)p->normal[0], (double)p->normal[1], (double)p->normal[2],
-                                (double)p->radius,    (double)p->colour[0], (double)p->colour[1],
-                                (double)p->colour[2], (double)p->intensity, p->scan,
-                                p->classification,    p->return_number,     p->returns,
-                                p->gps_time };
+    const double v[DOUBLES] = {
+        p->position[0],         p->position[1],       p->position[2],       (double)p->normal[0],
+        (double)p->normal[1],   (double)p->normal[2], (double)p->radius,    (double)p->colour[0],
+        (double)p->colour[1],   (double)p->colour[2], (double)p->intensity, p->scan,
+        p->classification,      p->return_number,     p->returns,           p->gps_time,
+        (double)p->uncertainty, (double)p->footprint
+    };
     fwrite(v, sizeof v, 1, to);
 }
 
