@@ -1,0 +1,68 @@
+/* Draws surfels on the CPU, as surfel_picture.h defines it, from batches in any order. The result
+ * has the same bits for any number of threads, order and size of batches, and memory. The memory
+ * does not depend on the number of surfels. The caller owns it and calls it from one thread; the
+ * runner lends it others.
+ *
+ * Each batch lowers the least depths and the keys of the cells by atomic minima. Then the surfels
+ * that hold their cell write themselves into it. Surfels behind the depths of earlier batches are
+ * skipped. A pyramid of greatest depths tells this for surfels, and for whole bricks before they
+ * are read. */
+#ifndef TRIP_SURFELS_CPU_H
+#define TRIP_SURFELS_CPU_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "budget.h"
+#include "gaussian_picture.h"
+#include "task_runner.h"
+
+typedef struct trip_surfels_cpu trip_surfels_cpu;
+
+typedef struct trip_surfels_cpu_params {
+    const trip_camera *camera;              /* copied */
+    const trip_gaussian_settings *settings; /* copied, but not the light */
+    trip_budget *budget;
+    const trip_task_runner *runner; /* NULL for no threads */
+} trip_surfels_cpu_params;
+
+typedef struct trip_surfels_cpu_stats {
+    uint64_t added;
+    uint64_t outside; /* added, but not drawn: they do not meet the picture or the clip */
+    uint64_t hidden;  /* skipped behind earlier batches */
+    uint64_t visible; /* selected and visible in the last picture */
+    uint64_t project_ns, blend_ns;
+} trip_surfels_cpu_stats;
+
+/* Begins a picture. It takes about 110 bytes per pixel and up to 3 MB for a batch. Fails (reported)
+ * if the budget refuses that. */
+int trip_surfels_cpu_begin(trip_surfels_cpu **out, const trip_surfels_cpu_params *params);
+void trip_surfels_cpu_end(trip_surfels_cpu *s); /* NULL is allowed */
+
+/* Gets surfel `i` of a batch. Any thread. */
+typedef void trip_surfel_getter(const void *context, size_t i, trip_gaussian *out);
+
+/* Adds surfels with the numbers from `first` on. No number may be added twice. Fails if it is
+ * interrupted. */
+int trip_surfels_cpu_add(trip_surfels_cpu *s, const trip_gaussian *surfels, size_t count,
+                         uint32_t first);
+int trip_surfels_cpu_add_from(trip_surfels_cpu *s, trip_surfel_getter *get, const void *context,
+                              size_t count, uint32_t first);
+
+/* Returns whether surfels change nothing: they reach up to a rectangle, in pixels, and lie behind
+ * `depth`, together with their tolerances. The rectangle may exceed the picture. */
+bool trip_surfels_cpu_hides(const trip_surfels_cpu *s, const double lo[2], const double hi[2],
+                            double depth);
+
+/* Calls `mark` with the number of each visible surfel. */
+void trip_surfels_cpu_each_visible(const trip_surfels_cpu *s,
+                                   void (*mark)(void *context, uint32_t number), void *context);
+
+/* Writes the picture of the surfels so far: width * height * 4 floats, premultiplied, row 0 at the
+ * top, over the background. With settings.depth it also writes width * height distances; otherwise
+ * `depth` is NULL. More surfels may be added afterwards. */
+void trip_surfels_cpu_picture(trip_surfels_cpu *s, float *rgba, float *depth);
+
+trip_surfels_cpu_stats trip_surfels_cpu_get_stats(const trip_surfels_cpu *s);
+
+#endif

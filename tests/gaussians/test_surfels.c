@@ -1,0 +1,468 @@
+/* The deferred picture of surfels: closed forms, the same bits in all circumstances, and the
+ * reference renderer. */
+#include "gaussian_footprint.h"
+#include "pool_runner.h"
+#include "surfel_picture.h"
+#include "surfels_cpu.h"
+#include "surfels_reference.h"
+#include "test.h"
+
+enum { WIDTH = 150, HEIGHT = 90, PIXELS = WIDTH * HEIGHT, SCENE = 6000, SIDE = 120 };
+
+/* Looks along z from the origin; x goes left. */
+static trip_camera camera_of(double ortho_height)
+{
+    const trip_camera_params params = { .look = trip_v3(0, 0, 1),
+                                        .up = trip_v3(0, 1, 0),
+                                        .fov_degrees = 60,
+                                        .ortho_height = ortho_height,
+                                        .width = WIDTH,
+                                        .height = HEIGHT };
+    const trip_affine identity = trip_affine_identity();
+    trip_camera c;
+    assert_int_equal(trip_camera_make(&c, &params, &identity), 0);
+    return c;
+}
+
+/* How a picture is drawn. 0 means one thread, one batch in order, and 64 MB. */
+typedef struct way {
+    unsigned threads;
+    size_t batch;
+    bool backwards; /* the last batch comes first */
+    uint64_t memory_bytes;
+} way;
+
+typedef struct drawn {
+    float rgba[4 * PIXELS], depth[PIXELS];
+    trip_surfels_cpu_stats stats;
+} drawn;
+
+static void add_all(trip_surfels_cpu *s, const trip_gaussian *surfels, size_t count, way w)
+{
+    const size_t batch = w.batch ? w.batch : count, batches = (count + batch - 1) / batch;
+    for (size_t i = 0; i < batches; i++) {
+        const size_t from = (w.backwards ? batches - 1 - i : i) * batch;
+        const size_t some = batch < count - from ? batch : count - from;
+        assert_int_equal(trip_surfels_cpu_add(s, surfels + from, some, (uint32_t)from), 0);
+    }
+}
+
+static void draw(drawn *out, const trip_camera *c, const trip_gaussian_settings *settings,
+                 const trip_gaussian *surfels, size_t count, way w)
+{
+    trip_budget *budget;
+    trip_cpu_pool *pool;
+    trip_surfels_cpu *s;
+    assert_int_equal(trip_budget_create(&budget, w.memory_bytes ? w.memory_bytes : 64u << 20), 0);
+    assert_int_equal(trip_cpu_pool_create(&pool, w.threads ? w.threads : 1), 0);
+    const trip_task_runner runner = { run_all, pool };
+    const trip_surfels_cpu_params params = {
+        .camera = c, .settings = settings, .budget = budget, .runner = &runner
+    };
+    assert_int_equal(trip_surfels_cpu_begin(&s, &params), 0);
+    add_all(s, surfels, count, w);
+    trip_surfels_cpu_picture(s, out->rgba, settings->depth ? out->depth : NULL);
+    out->stats = trip_surfels_cpu_get_stats(s);
+    trip_surfels_cpu_end(s);
+    trip_cpu_pool_destroy(pool);
+    assert_true(trip_budget_left_bytes(budget) == trip_budget_limit_bytes(budget));
+    trip_budget_destroy(budget);
+}
+
+static void draw_reference(drawn *out, const trip_camera *c, const trip_gaussian_settings *settings,
+                           const trip_gaussian *surfels, size_t count)
+{
+    trip_budget *budget;
+    trip_surfels_reference *r;
+    assert_int_equal(trip_budget_create(&budget, 64u << 20), 0);
+    assert_int_equal(trip_surfels_reference_begin(&r, c, settings, budget), 0);
+    assert_int_equal(trip_surfels_reference_add(r, surfels, count, 0), 0);
+    trip_surfels_reference_picture(r, out->rgba, settings->depth ? out->depth : NULL);
+    trip_surfels_reference_end(r);
+    assert_true(trip_budget_left_bytes(budget) == trip_budget_limit_bytes(budget));
+    trip_budget_destroy(budget);
+}
+
+static void colour(trip_gaussian *g, double red, double green, double blue)
+{
+    g->sh[0][0] = trip_sh_of_colour(red);
+    g->sh[0][1] = trip_sh_of_colour(green);
+    g->sh[0][2] = trip_sh_of_colour(blue);
+}
+
+/* A surfel with a radius. Its normal points along z, turned about x by an angle. */
+static trip_gaussian surfel_at(double x, double y, double z, double radius, double angle)
+{
+    const float d = (float)(0.85 * radius);
+    trip_gaussian g = { .centre = { x, y, z },
+                        .deviations = { d, d, 0 },
+                        .rotation = { (float)cos(angle / 2), (float)sin(angle / 2), 0, 0 },
+                        .opacity = 1 };
+    colour(&g, 1, 1, 1);
+    return g;
+}
+
+/* A plane through (0, 0, z), turned about x: SIDE * SIDE surfels of a square grid. Their radii are
+ * the distance over the root of 2, as in clouds of points. */
+static trip_gaussian *plane_at(trip_gaussian *to, double z, double distance, double angle)
+{
+    for (int i = 0; i < SIDE * SIDE; i++) {
+        const double u = (i % SIDE - SIDE / 2 + 0.3) * distance;
+        const double v = (i / SIDE - SIDE / 2 + 0.4) * distance;
+        to[i] = surfel_at(u, v * cos(angle), z + v * sin(angle), distance / sqrt(2), angle);
+    }
+    return to;
+}
+
+static const float *pixel(const drawn *d, int x, int y)
+{
+    return d->rgba + 4 * (y * WIDTH + x);
+}
+
+static drawn one, other;
+static trip_gaussian surfels[4 * SIDE * SIDE];
+static const trip_gaussian_settings plain = { .depth = true };
+
+static void expect_pixel(const drawn *d, int x, int y, const double rgba[4], double tolerance)
+{
+    for (int k = 0; k < 4; k++)
+        assert_close((double)pixel(d, x, y)[k], rgba[k], tolerance);
+}
+
+/* ---- closed forms ---- */
+
+static void a_disc_has_its_radius_and_an_edge_of_a_pixel(void **state)
+{
+    (void)state;
+    const trip_camera c =
+        camera_of(9); /* 10 px per unit; the centre of pixel (75, 45) is at 75.5 */
+    trip_gaussian g = surfel_at(-0.05, -0.05, 5, 2, 0);
+    const double radius = sqrt(2 * log(2) * (17.0 * 17 + 0.48));
+    colour(&g, 0.25, 0.5, 1);
+    draw(&one, &c, &plain, &g, 1, (way){ 0 });
+    for (int d = 0; d < 40; d++) {
+        const double a = fmax(0, fmin(1, radius - d));
+        const double rgba[4] = { 0.25 * a, 0.5 * a, a, a };
+        expect_pixel(&one, 75 + d, 45, rgba, 1e-4);
+        expect_pixel(&one, 75 - d, 45, rgba, 1e-4);
+        expect_pixel(&one, 75, 45 + d, rgba, 1e-4);
+        if (a > 0)
+            assert_close((double)one.depth[45 * WIDTH + 75 + d], 5, 1e-6);
+        else
+            assert_true(isinf(one.depth[45 * WIDTH + 75 + d]));
+    }
+    assert_int_equal(one.stats.visible, 1);
+}
+
+/* A square of points with equal colours is a plane without holes, wherever the eye is. Each pixel
+ * has the depth at which its ray meets the plane, or at which a ray a pixel away meets it. */
+static void a_plane_is_closed_and_has_its_colour_and_depth(void **state)
+{
+    (void)state;
+    static const double angles[] = { 0, 0.5, 1, 1.3, 1.5 }, distances[] = { 0.02, 0.3, 1 };
+    const trip_gaussian_settings settings = { .depth = true, .background = { 1, 0, 0, 1 } };
+    int seen = 0;
+    for (int ortho = 0; ortho < 2; ortho++)
+        for (size_t i = 0; i < sizeof angles / sizeof *angles * 3; i++) {
+            const double angle = angles[i / 3], distance = distances[i % 3];
+            const trip_camera c = camera_of(ortho ? 9 : 0);
+            plane_at(surfels, 5, distance, angle);
+            for (int k = 0; k < SIDE * SIDE; k++)
+                colour(&surfels[k], 0.25, 0.5, 0.75);
+            draw(&one, &c, &settings, surfels, SIDE * SIDE, (way){ 0 });
+            for (int at = 0; at < PIXELS; at++) {
+                const trip_vec3 ray = trip_camera_ray(&c, at % WIDTH + 0.5, at / WIDTH + 0.5);
+                const trip_vec3 across = trip_add(trip_scale(c.rx, at % WIDTH + 0.5),
+                                                  trip_scale(c.ry, at / WIDTH + 0.5));
+                const trip_vec3 from = ortho ? trip_add(c.eye, across) : c.eye;
+                const trip_vec3 normal = trip_v3(0, -sin(angle), cos(angle));
+                const double z =
+                    trip_dot(normal, trip_sub(trip_v3(0, 0, 5), from)) / trip_dot(normal, ray);
+                const trip_vec3 p = trip_add(from, trip_scale(ray, z));
+                const double inside = (SIDE / 2 - 2) * distance;
+                const double edge = 3 * trip_length(ortho ? c.rx : trip_scale(c.rx, z));
+                if (!(z > 2 * distance && fabs(p.x) < inside - edge &&
+                      fabs(p.y) < inside * cos(angle) - edge))
+                    continue;
+                seen++;
+                expect_pixel(&one, at % WIDTH, at / WIDTH, (double[]){ 0.25, 0.5, 0.75, 1 }, 1e-5);
+                assert_close((double)one.depth[at], z * trip_length(ray),
+                             0.1 * distance / cos(angle) + 0.4 * edge * tan(angle));
+            }
+        }
+    assert_true(seen > 10 * PIXELS);
+}
+
+static void surfels_beyond_the_border_reach_the_picture(void **state)
+{
+    (void)state;
+    const trip_camera c = camera_of(9);
+    /* A disc of 100 px beside each corner and each side covers the whole picture. A small disc lies
+     * between the left one and the picture, in front of it. */
+    int count = 0;
+    for (int x = -1; x <= 1; x++)
+        for (int y = -1; y <= 1; y++)
+            if (x || y)
+                surfels[count++] = surfel_at(13.5 * x, 6 * y, 30, 10, 0);
+    surfels[count++] = surfel_at(8.3, 0, 18, 0.5, 0);
+    draw(&one, &c, &plain, surfels, (size_t)count, (way){ 0 });
+    for (int at = 0; at < PIXELS; at++)
+        expect_pixel(&one, at % WIDTH, at / WIDTH, (double[]){ 1, 1, 1, 1 }, 1e-6);
+    assert_int_equal(one.stats.visible, 9);
+}
+
+static void far_points_never_get_lost(void **state)
+{
+    (void)state;
+    const trip_camera c = camera_of(9);
+    for (int i = 0; i < 200; i++) {
+        const double x = 12 * test_random() - 6, y = 8 * test_random() - 4;
+        trip_gaussian g = surfel_at(x, y, 5, 1e-4, 0);
+        draw(&one, &c, &plain, &g, 1, (way){ 0 });
+        double sum = 0;
+        for (int at = 0; at < PIXELS; at++)
+            sum += (double)one.rgba[4 * at + 3];
+        assert_true(sum > 0.1 && sum < 1.2);
+        const int column = (int)floor(WIDTH / 2.0 - 10 * x),
+                  row = (int)floor(HEIGHT / 2.0 - 10 * y);
+        assert_true(isfinite(one.depth[row * WIDTH + column]));
+    }
+}
+
+/* ---- several surfaces ---- */
+
+static void only_the_front_plane_is_seen(void **state)
+{
+    (void)state;
+    const trip_camera c = camera_of(0);
+    plane_at(surfels, 5, 0.1, 0.3);
+    plane_at(surfels + SIDE * SIDE, 5.3, 0.1, 0.3);
+    for (int k = 0; k < SIDE * SIDE; k++)
+        colour(&surfels[SIDE * SIDE + k], 1, 0, 0);
+    draw(&one, &c, &plain, surfels, SIDE * SIDE, (way){ 0 });
+    draw(&other, &c, &plain, surfels, 2 * SIDE * SIDE, (way){ 0 });
+    assert_memory_equal(one.rgba, other.rgba, sizeof one.rgba);
+    assert_memory_equal(one.depth, other.depth, sizeof one.depth);
+}
+
+/* Two noisy scans of one surface, closer than the tolerance, count as one surface of both
+ * colours. */
+static void scans_of_one_surface_blend(void **state)
+{
+    (void)state;
+    const trip_camera c = camera_of(9);
+    double red = 0, green = 0;
+    plane_at(surfels, 5, 0.3, 0);
+    plane_at(surfels + SIDE * SIDE, 5, 0.3, 0);
+    for (int k = 0; k < 2 * SIDE * SIDE; k++) {
+        trip_gaussian *g = &surfels[k];
+        g->centre[0] += k < SIDE * SIDE ? 0 : 0.15;
+        g->centre[2] += 0.4 * g->deviations[0] * (test_random() - 0.5);
+        colour(g, k < SIDE * SIDE, k >= SIDE * SIDE, 0);
+    }
+    draw(&one, &c, &plain, surfels, 2 * SIDE * SIDE, (way){ 0 });
+    for (int at = 0; at < PIXELS; at++) {
+        const float *p = one.rgba + 4 * at;
+        assert_close((double)p[0] + (double)p[1], 1, 1e-5);
+        assert_true((double)p[0] > 0.1 && (double)p[1] > 0.1);
+        red += (double)p[0] / PIXELS;
+        green += (double)p[1] / PIXELS;
+    }
+    assert_close(red, 0.5, 0.02);
+    assert_close(green, 0.5, 0.02);
+}
+
+/* Where a front disc ends, its last pixel shows the plane behind, and not the background. */
+static void an_edge_shows_the_surface_behind_it(void **state)
+{
+    (void)state;
+    const trip_camera c = camera_of(9);
+    const trip_gaussian_settings settings = { .background = { 0, 0, 1, 1 } };
+    plane_at(surfels, 9, 0.3, 0);
+    surfels[SIDE * SIDE] = surfel_at(-0.05, -0.05, 5, 2, 0);
+    for (int k = 0; k <= SIDE * SIDE; k++)
+        colour(&surfels[k], k == SIDE * SIDE, k < SIDE * SIDE, 0);
+    const double radius = sqrt(2 * log(2) * (17.0 * 17 + 0.48));
+    draw(&one, &c, &settings, surfels, SIDE * SIDE + 1, (way){ 0 });
+    for (int d = 0; d < 40; d++) {
+        const double a = fmax(0, fmin(1, radius - d));
+        expect_pixel(&one, 75 + d, 45, (double[]){ a, 1 - a, 0, 1 }, 1e-4);
+    }
+}
+
+/* ---- the reference, and the same bits ---- */
+
+/* A repeatable scene: surfels of all directions and sizes, some merged, some near the eye, and two
+ * planes. */
+static const trip_gaussian *random_scene(void)
+{
+    static trip_gaussian scene[SCENE];
+    if (scene[0].opacity > 0)
+        return scene;
+    for (int i = 0; i < SCENE; i++) {
+        trip_gaussian *g = &scene[i];
+        const double z = 0.1 + 20 * test_random(), size = i % 200 == 0 ? 1 : 0.1;
+        *g = surfel_at(z * (2 * test_random() - 1), z * (2 * test_random() - 1), z, 0, 0);
+        double length = 0;
+        for (int k = 0; k < 4; k++) {
+            g->rotation[k] = (float)(2 * test_random() - 1);
+            length += (double)(g->rotation[k] * g->rotation[k]);
+        }
+        for (int k = 0; k < 4; k++)
+            g->rotation[k] /= (float)sqrt(length);
+        for (int k = 0; k < 3; k++)
+            g->deviations[k] = (float)(size * exp(-3 * test_random()));
+        g->merged = i % 7 == 0;
+        if (!g->merged)
+            g->deviations[2] = 0;
+        g->opacity = i % 3 ? 0.99f : 0.5f;
+        colour(g, test_random(), test_random(), test_random());
+    }
+    for (int i = 0; i < SCENE / 2; i++) { /* equal depths in parallel views, and a noisy wall */
+        scene[i].centre[2] = i % 4 < 2 ? 12 + 2 * (i % 2) : 12 + 0.5 * test_random();
+        scene[i].rotation[0] = 1;
+        scene[i].rotation[1] = scene[i].rotation[2] = scene[i].rotation[3] = 0;
+        scene[i].deviations[0] = scene[i].deviations[1] = 0.12f;
+    }
+    return scene;
+}
+
+static const trip_gaussian_settings full = { .background = { 0.2, 0.4, 0.6, 0.9 }, .depth = true };
+
+static void cpu_draws_the_reference(void **state)
+{
+    (void)state;
+    for (int ortho = 0; ortho < 2; ortho++) {
+        const trip_camera c = camera_of(ortho ? 20 : 0);
+        int apart = 0;
+        draw(&one, &c, &full, random_scene(), SCENE, (way){ 0 });
+        draw_reference(&other, &c, &full, random_scene(), SCENE);
+        for (int at = 0; at < PIXELS; at++) {
+            const bool far = test_max_apart(one.rgba + 4 * at, other.rgba + 4 * at, 4) > 1e-3;
+            const double a = (double)one.depth[at], b = (double)other.depth[at];
+            apart += far || isinf(a) != isinf(b) || (isfinite(a) && fabs(a - b) > 1e-4 * b);
+        }
+        /* Rounding decides rarely whether a surfel covers a pixel, or lies within a tolerance. */
+        assert_in_range(apart, 0, PIXELS / 500);
+    }
+}
+
+static void expect_same(way w)
+{
+    for (int ortho = 0; ortho < 2; ortho++) {
+        const trip_camera c = camera_of(ortho ? 20 : 0);
+        draw(&one, &c, &full, random_scene(), SCENE, (way){ 0 });
+        draw(&other, &c, &full, random_scene(), SCENE, w);
+        assert_memory_equal(one.rgba, other.rgba, sizeof one.rgba);
+        assert_memory_equal(one.depth, other.depth, sizeof one.depth);
+        assert_int_equal(one.stats.visible, other.stats.visible);
+        assert_int_equal(one.stats.hidden, 0); /* all in one batch */
+        assert_true(!w.batch || other.stats.hidden > 0);
+    }
+}
+
+static void threads_change_no_bit(void **state)
+{
+    (void)state;
+    expect_same((way){ .threads = 2 });
+    expect_same((way){ .threads = 5 });
+}
+
+static void order_and_batches_change_no_bit(void **state)
+{
+    (void)state;
+    expect_same((way){ .batch = 1 });
+    expect_same((way){ .batch = 1, .backwards = true });
+    expect_same((way){ .batch = 700, .backwards = true, .threads = 3 });
+}
+
+/* Two scans of a surface, with noise about as large as the tolerance. */
+static void hidden_surfels_of_noisy_scans_change_no_bit(void **state)
+{
+    (void)state;
+    const trip_camera c = camera_of(0);
+    plane_at(surfels, 5, 0.05, 0.5);
+    plane_at(surfels + SIDE * SIDE, 5.02, 0.05, 0.5);
+    for (int k = 0; k < 2 * SIDE * SIDE; k++) {
+        surfels[k].centre[2] += 0.4 * (test_random() - 0.5);
+        colour(&surfels[k], test_random(), test_random(), test_random());
+    }
+    draw(&one, &c, &full, surfels, 2 * SIDE * SIDE, (way){ 0 });
+    draw(&other, &c, &full, surfels, 2 * SIDE * SIDE, (way){ .batch = 900, .backwards = true });
+    assert_memory_equal(one.rgba, other.rgba, sizeof one.rgba);
+    assert_memory_equal(one.depth, other.depth, sizeof one.depth);
+    assert_true(other.stats.hidden > 300);
+}
+
+static void memory_changes_no_bit(void **state)
+{
+    (void)state;
+    expect_same((way){ .memory_bytes = 3200 * 1024, .batch = 2000, .threads = 2 });
+}
+
+static void hidden_rectangles_are_told(void **state)
+{
+    (void)state;
+    const trip_camera c = camera_of(9);
+    trip_budget *budget;
+    trip_surfels_cpu *s;
+    assert_int_equal(trip_budget_create(&budget, 64u << 20), 0);
+    assert_int_equal(
+        trip_surfels_cpu_begin(
+            &s, &(trip_surfels_cpu_params){ .camera = &c, .settings = &plain, .budget = budget }),
+        0);
+    /* It covers the columns from 0 to 64 or so: the middle of the left edge is its centre. */
+    const trip_gaussian wall = surfel_at(7.5, 0, 5, 8, 0);
+    assert_int_equal(trip_surfels_cpu_add(s, &wall, 1, 0), 0);
+    assert_true(trip_surfels_cpu_hides(s, (double[]){ 3, 30 }, (double[]){ 40, 60 }, 5.1));
+    assert_false(trip_surfels_cpu_hides(s, (double[]){ 3, 30 }, (double[]){ 40, 60 }, 5));
+    assert_false(trip_surfels_cpu_hides(s, (double[]){ 3, 30 }, (double[]){ 140, 60 }, 5.1));
+    assert_true(trip_surfels_cpu_hides(s, (double[]){ -99, 30 }, (double[]){ -10, 60 }, 5.1));
+    assert_false(
+        trip_surfels_cpu_hides(s, (double[]){ -1e30, -1e30 }, (double[]){ 1e30, 1e30 }, 9));
+    trip_surfels_cpu_end(s);
+    trip_budget_destroy(budget);
+}
+
+static void too_little_memory_is_told(void **state)
+{
+    (void)state;
+    const trip_camera c = camera_of(9);
+    trip_budget *budget;
+    trip_surfels_cpu *s;
+    trip_surfels_reference *r;
+    assert_int_equal(trip_budget_create(&budget, 1u << 20), 0);
+    test_catch_reports();
+    assert_true(trip_surfels_cpu_begin(&s, &(trip_surfels_cpu_params){ .camera = &c,
+                                                                       .settings = &plain,
+                                                                       .budget = budget }) < 0);
+    assert_null(s);
+    assert_one_report("raise --memory");
+    test_catch_reports();
+    assert_true(trip_surfels_reference_begin(&r, &c, &plain, budget) < 0);
+    assert_one_report("raise --memory");
+    assert_null(r);
+    assert_true(trip_budget_left_bytes(budget) == trip_budget_limit_bytes(budget));
+    trip_budget_destroy(budget);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_disc_has_its_radius_and_an_edge_of_a_pixel),
+        cmocka_unit_test(a_plane_is_closed_and_has_its_colour_and_depth),
+        cmocka_unit_test(surfels_beyond_the_border_reach_the_picture),
+        cmocka_unit_test(far_points_never_get_lost),
+        cmocka_unit_test(only_the_front_plane_is_seen),
+        cmocka_unit_test(scans_of_one_surface_blend),
+        cmocka_unit_test(an_edge_shows_the_surface_behind_it),
+        cmocka_unit_test(cpu_draws_the_reference),
+        cmocka_unit_test(threads_change_no_bit),
+        cmocka_unit_test(order_and_batches_change_no_bit),
+        cmocka_unit_test(hidden_surfels_of_noisy_scans_change_no_bit),
+        cmocka_unit_test(memory_changes_no_bit),
+        cmocka_unit_test(hidden_rectangles_are_told),
+        cmocka_unit_test(too_little_memory_is_told),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
