@@ -8,9 +8,17 @@
 /* The coefficient of a colour of 0. Drawing raises lower colours to it. */
 #define BLACK (-0.5 / 0.28209479177387814)
 #define SWEEPS 16
+#define NEWTON_STEPS 20
+/* A covariance is diagonal if the other values are at most this part of its diagonal. */
+#define DIAGONAL 1e-18
+
+/* Li2(ALPHA_MAX), which most surfels need. */
+#define ALPHA_MAX_DILOGARITHM 1.5886254480763753
 
 double trip_dilogarithm(double x)
 {
+    if (x == ALPHA_MAX)
+        return ALPHA_MAX_DILOGARITHM;
     if (x > 0.5) {
         const double rest = 1 - x;
         return M_PI * M_PI / 6 - (rest > 0 ? log(x) * log(rest) : 0) - trip_dilogarithm(rest);
@@ -113,8 +121,8 @@ static void turn(double m[3][3], double axes[3][3], int p, int q)
     if (m[p][q] == 0)
         return;
     const double theta = (m[q][q] - m[p][p]) / (2 * m[p][q]);
-    const double t = (theta < 0 ? -1 : 1) / (fabs(theta) + hypot(theta, 1));
-    const double c = 1 / hypot(t, 1), s = t * c;
+    const double t = (theta < 0 ? -1 : 1) / (fabs(theta) + sqrt(theta * theta + 1));
+    const double c = 1 / sqrt(t * t + 1), s = t * c;
     for (int k = 0; k < 3; k++) {
         const double x = m[k][p], y = m[k][q];
         m[k][p] = c * x - s * y;
@@ -157,6 +165,9 @@ static void set_axes(const double s[6], float rotation[4], double deviations[3])
     double m[3][3] = { { s[0], s[1], s[2] }, { s[1], s[3], s[4] }, { s[2], s[4], s[5] } };
     double axes[3][3] = { { 1, 0, 0 }, { 0, 1, 0 }, { 0, 0, 1 } };
     for (int i = 0; i < SWEEPS; i++) {
+        const double beside = fabs(m[0][1]) + fabs(m[0][2]) + fabs(m[1][2]);
+        if (beside <= DIAGONAL * (m[0][0] + m[1][1] + m[2][2]))
+            break;
         turn(m, axes, 0, 1);
         turn(m, axes, 0, 2);
         turn(m, axes, 1, 2);
@@ -166,18 +177,18 @@ static void set_axes(const double s[6], float rotation[4], double deviations[3])
     set_rotation(axes, rotation);
 }
 
-/* Returns the opacity o from 0 to ALPHA_MAX with Li2(o) = depth. Li2 is convex and ascends. */
+/* Returns the opacity o from 0 to ALPHA_MAX with Li2(o) = depth, by Newton's method. Li2 is convex
+ * and ascends, and its slope is -ln(1 - o) / o. So the steps from above never pass the root. */
 static double opacity_of(double depth)
 {
-    double lo = 0, hi = ALPHA_MAX;
-    for (int i = 0; i < 40; i++) {
-        const double middle = (lo + hi) / 2;
-        if (trip_dilogarithm(middle) < depth)
-            lo = middle;
-        else
-            hi = middle;
+    double o = fmin(depth, ALPHA_MAX);
+    for (int i = 0; i < NEWTON_STEPS && o > 0; i++) {
+        const double step = (trip_dilogarithm(o) - depth) * o / -log1p(-o);
+        o = fmin(o - step, ALPHA_MAX);
+        if (fabs(step) < 1e-13)
+            break;
     }
-    return hi;
+    return fmax(o, 0);
 }
 
 trip_gaussian trip_gaussian_moments_merge(const trip_gaussian_moments *m, int degree)

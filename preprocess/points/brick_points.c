@@ -264,10 +264,13 @@ static int complete_tile(void *user, unsigned thread, uint64_t item)
     trip_point_row *rows = b->rows + item * TRIP_POINT_TILE_MAX;
     const uint32_t count = trip_point_tiles_at(b->tiles, tile)->count;
     trip_neighbours n = { .count = 0 };
+    const unsigned wanted = b->p->neighbours ? b->p->neighbours : TRIP_POINT_NEIGHBOURS;
     int status = trip_point_tiles_read(b->tiles, tile, rows);
+    if (status == 0)
+        status = trip_point_tiles_prepare(b->tiles, thread, tile, rows, wanted);
     for (uint32_t i = 0; i < count && status == 0; i++) {
         if (i == 0 || memcmp(n.position, rows[i].position, sizeof n.position)) {
-            n.wanted = b->p->neighbours ? b->p->neighbours : TRIP_POINT_NEIGHBOURS;
+            n.wanted = wanted;
             n.count = 0;
             memcpy(n.position, rows[i].position, sizeof n.position);
             status = trip_point_tiles_search(b->tiles, thread, tile, &n);

@@ -7,9 +7,16 @@
 #include <string.h>
 
 #include "folder.h"
+#include "near_search.h"
 #include "report.h"
 
+/* Positions near a tile, at most, for the fast searches. */
+enum { CANDIDATES_MAX = 4 * TRIP_POINT_TILE_MAX };
+
 enum { FAN = 8, LEVELS_MAX = 24, SLOTS_MAX = 4096, SORTED_BYTES = 1 << 17, TELL_EVERY = 1 << 14 };
+
+/* Candidates are this many times as far outside of a tile as neighbours are in it. */
+#define MARGIN 2.5
 
 typedef struct box {
     double lo[3], hi[3];
@@ -20,7 +27,7 @@ typedef struct slot {
     uint64_t tile;
     uint64_t used; /* number of the last search that used it */
     unsigned users;
-    bool filled, loading;
+    bool filled, loading, planting; /* positions are there; they or the tree are being made */
     int status;
     uint32_t count;
     double (*positions)[3];
@@ -65,8 +72,10 @@ struct trip_point_tiles {
     unsigned slot_count, threads;
     uint32_t *slot_of; /* 1 + the slot of a tile; 0: none */
     uint64_t searches;
-    trip_point_row *rooms; /* for the rows of a tile, one for each thread */
-    near_tiles *near;      /* one for each thread */
+    trip_point_row *rooms;   /* for the rows of a tile, one for each thread */
+    near_tiles *near;        /* one for each thread */
+    trip_near_search **fast; /* the same, and whether they hold a tile */
+    bool *prepared;
 };
 
 static int fail_memory(const trip_point_tiles *t)
@@ -251,8 +260,16 @@ static int take_slots(trip_point_tiles *t, unsigned count)
     t->slot_of = trip_budget_take(t->budget, t->tile_count * sizeof *t->slot_of);
     t->rooms = trip_budget_take(t->budget, t->threads * room_bytes);
     t->near = calloc(t->threads, sizeof *t->near);
-    if (!t->slots || !t->slot_of || !t->rooms || !t->near)
+    t->fast = calloc(t->threads, sizeof *t->fast);
+    t->prepared = calloc(t->threads, sizeof *t->prepared);
+    if (!t->slots || !t->slot_of || !t->rooms || !t->near || !t->fast || !t->prepared)
         return fail_memory(t);
+    for (unsigned i = 0; i < t->threads; i++) {
+        void *memory = trip_budget_take(t->budget, trip_near_search_bytes(CANDIDATES_MAX));
+        if (!memory)
+            return fail_memory(t);
+        t->fast[i] = trip_near_search_make(memory, CANDIDATES_MAX);
+    }
     for (; t->slot_count < count; t->slot_count++) {
         slot *s = &t->slots[t->slot_count];
         const size_t beside = slot_bytes() - positions_bytes();
@@ -300,8 +317,7 @@ static int load(trip_point_tiles *t, unsigned thread, slot *s)
     s->count = t->tiles[s->tile].count;
     for (uint32_t i = 0; i < s->count; i++)
         memcpy(s->positions[i], rows[i].position, sizeof s->positions[i]);
-    s->tree = trip_neighbour_tree_make((const double(*)[3])s->positions, s->count);
-    return s->tree ? 0 : trip_fail(TRIP_ERROR, "brick", t->params.name, "out of memory");
+    return 0;
 }
 
 /* Empties a slot for a tile. The lock is held. */
@@ -346,6 +362,27 @@ static slot *hold(trip_point_tiles *t, unsigned thread, uint64_t tile)
     return s;
 }
 
+/* Makes the tree of a slot that the thread holds, unless it is there. */
+static int plant(trip_point_tiles *t, slot *s)
+{
+    pthread_mutex_lock(&t->lock);
+    while (s->planting)
+        pthread_cond_wait(&t->loaded, &t->lock);
+    const bool wanted = !s->tree;
+    s->planting = wanted;
+    pthread_mutex_unlock(&t->lock);
+    if (!wanted)
+        return 0;
+    trip_neighbour_tree *tree =
+        trip_neighbour_tree_make((const double(*)[3])s->positions, s->count);
+    pthread_mutex_lock(&t->lock);
+    s->tree = tree;
+    s->planting = false;
+    pthread_cond_broadcast(&t->loaded);
+    pthread_mutex_unlock(&t->lock);
+    return tree ? 0 : trip_fail(TRIP_ERROR, "brick", t->params.name, "out of memory");
+}
+
 static void let_go(trip_point_tiles *t, slot *s)
 {
     pthread_mutex_lock(&t->lock);
@@ -356,7 +393,9 @@ static void let_go(trip_point_tiles *t, slot *s)
 static int search_tile(trip_point_tiles *t, unsigned thread, uint64_t tile, trip_neighbours *n)
 {
     slot *s = hold(t, thread, tile);
-    const int status = s->status;
+    int status = s->status;
+    if (status == 0)
+        status = plant(t, s);
     if (status == 0)
         trip_neighbour_tree_search(s->tree, n);
     let_go(t, s);
@@ -477,6 +516,8 @@ static const near_tiles *find_near(const trip_point_tiles *t, unsigned thread, u
 
 int trip_point_tiles_search(trip_point_tiles *t, unsigned thread, uint64_t tile, trip_neighbours *n)
 {
+    if (t->prepared[thread] && trip_near_search_find(t->fast[thread], n))
+        return 0;
     const near_tiles *near = find_near(t, thread, tile);
     int status = search_tile(t, thread, tile, n);
     if (status < 0 || !(trip_neighbours_reach2(n) <= near->distance2))
@@ -485,6 +526,60 @@ int trip_point_tiles_search(trip_point_tiles *t, unsigned thread, uint64_t tile,
         if (distance2(near->tiles[i].box.lo, near->tiles[i].box.hi, n->position) <=
             trip_neighbours_reach2(n))
             status = search_tile(t, thread, near->tiles[i].tile, n);
+    return status;
+}
+
+/* ---- fast searches ---- */
+
+/* Returns about the distance of the last of `wanted` neighbours in a tile, if its points are even
+ * on a surface or in its box. */
+static double reach_in(const trip_point_tile *tile, unsigned wanted)
+{
+    double extent[3], least = INFINITY, all = 1;
+    for (int a = 0; a < 3; a++) {
+        extent[a] = tile->hi[a] - tile->lo[a];
+        least = fmin(least, extent[a]);
+        all *= extent[a];
+    }
+    const double area =
+        least > 0 ? all / least
+                  : fmax(extent[0] * extent[1], fmax(extent[0] * extent[2], extent[1] * extent[2]));
+    const double share = (double)wanted / tile->count;
+    return fmax(sqrt(area * share / M_PI), cbrt(all * share * 3 / (4 * M_PI)));
+}
+
+static int add_candidates(trip_point_tiles *t, unsigned thread, uint64_t tile,
+                          trip_near_search *fast, bool *whole)
+{
+    slot *s = hold(t, thread, tile);
+    for (uint32_t i = 0; i < s->count && s->status == 0 && *whole; i++)
+        *whole = trip_near_search_add(fast, s->positions[i]);
+    const int status = s->status;
+    let_go(t, s);
+    return status;
+}
+
+int trip_point_tiles_prepare(trip_point_tiles *t, unsigned thread, uint64_t tile,
+                             const trip_point_row *rows, unsigned wanted)
+{
+    const trip_point_tile *of = &t->tiles[tile];
+    trip_near_search *fast = t->fast[thread];
+    const near_tiles *near = find_near(t, thread, tile);
+    const double reach = reach_in(of, wanted);
+    const double margin = fmin(MARGIN * reach, sqrt(fmax(0, near->distance2)));
+    bool whole = near->distance2 >= 0;
+    int status = 0;
+    t->prepared[thread] = false;
+    trip_near_search_begin(fast, of->lo, of->hi, margin, reach);
+    for (uint32_t i = 0; i < of->count && whole; i++)
+        whole = trip_near_search_add(fast, rows[i].position);
+    for (unsigned i = 0; i < near->count && status == 0 && whole; i++)
+        if (apart2(near->tiles[i].box.lo, near->tiles[i].box.hi, of) <= margin * margin)
+            status = add_candidates(t, thread, near->tiles[i].tile, fast, &whole);
+    if (status == 0 && whole) {
+        trip_near_search_sort(fast);
+        t->prepared[thread] = true;
+    }
     return status;
 }
 
@@ -497,6 +592,11 @@ void trip_point_tiles_free(trip_point_tiles *t)
         trip_budget_release(t->budget, t->slots[i].positions, positions_bytes());
         trip_budget_discharge(t->budget, slot_bytes() - positions_bytes());
     }
+    for (unsigned i = 0; t->fast && i < t->threads; i++)
+        if (t->fast[i])
+            trip_budget_release(t->budget, t->fast[i], trip_near_search_bytes(CANDIDATES_MAX));
+    free(t->fast);
+    free(t->prepared);
     free(t->slots);
     free(t->near);
     if (t->slot_of)

@@ -60,6 +60,10 @@ int trip_point_tiles_read(const trip_point_tiles *t, uint64_t tile, trip_point_r
 
 /* Takes memory for searches by so many threads: up to half of the memory that is left. */
 int trip_point_tiles_begin_searches(trip_point_tiles *t, unsigned threads);
+/* Prepares fast searches by a thread for the positions of a tile, whose rows were read. Without it,
+ * searches give the same neighbours. */
+int trip_point_tiles_prepare(trip_point_tiles *t, unsigned thread, uint64_t tile,
+                             const trip_point_row *rows, unsigned wanted);
 /* Finds the nearest neighbours of n->position, which lies in a tile. Each thread has a number of
  * its own. */
 int trip_point_tiles_search(trip_point_tiles *t, unsigned thread, uint64_t tile,

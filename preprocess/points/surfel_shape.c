@@ -5,7 +5,11 @@
 
 #include "geometry.h"
 
-enum { SWEEPS = 12 };
+enum { SWEEPS = 12, NEWTON_STEPS = 12 };
+
+/* Of the sum of the variances: the last step, and the distance of the lower two for precision. */
+#define NEWTON_LAST 1e-14
+#define APART 0.01
 
 /* A matrix is diagonal if the other values are at most this part of its diagonal. */
 #define DIAGONAL 1e-14
@@ -62,8 +66,48 @@ static trip_vec3 across(trip_vec3 line, trip_vec3 towards)
     return trip_normalize(trip_sub(other, trip_scale(line, trip_dot(other, line))));
 }
 
+static trip_vec3 longer(trip_vec3 a, trip_vec3 b)
+{
+    return trip_dot(a, a) >= trip_dot(b, b) ? a : b;
+}
+
+/* Finds the direction of least variance if the variances differ enough that the closed form is
+ * precise. The least variance is the least root of the characteristic polynomial, which Newton's
+ * steps from 0 approach from below. */
+static bool find_least(double m[3][3], trip_vec3 *axis)
+{
+    const double trace = m[0][0] + m[1][1] + m[2][2], unit = 1 / trace;
+    if (!(trace > 0) || !isfinite(unit))
+        return false;
+    const double xx = m[0][0] * unit, yy = m[1][1] * unit, zz = m[2][2] * unit;
+    const double xy = m[0][1] * unit, xz = m[0][2] * unit, yz = m[1][2] * unit;
+    const double minors = xx * yy - xy * xy + (xx * zz - xz * xz) + (yy * zz - yz * yz);
+    const double determinant =
+        xx * (yy * zz - yz * yz) - xy * (xy * zz - yz * xz) + xz * (xy * yz - yy * xz);
+    double least = 0, step = 1;
+    for (int i = 0; i < NEWTON_STEPS && fabs(step) > NEWTON_LAST; i++) {
+        const double value = ((least - 1) * least + minors) * least - determinant;
+        const double slope = (3 * least - 2) * least + minors;
+        if (!(slope > 0))
+            return false;
+        step = value / slope;
+        least -= step;
+    }
+    const double half = (1 - least) / 2, product = minors - least * (1 - least);
+    const double middle = half - sqrt(fmax(0, half * half - product));
+    if (!(fabs(step) <= NEWTON_LAST) || !(middle - least > APART))
+        return false;
+    const trip_vec3 u = trip_v3(xx - least, xy, xz), v = trip_v3(xy, yy - least, yz),
+                    w = trip_v3(xz, yz, zz - least);
+    *axis = trip_normalize(longer(trip_cross(u, v), longer(trip_cross(u, w), trip_cross(v, w))));
+    return true;
+}
+
 static trip_vec3 normal_of(double variance[3][3], trip_vec3 towards)
 {
+    trip_vec3 least;
+    if (find_least(variance, &least))
+        return trip_dot(least, towards) < 0 ? trip_scale(least, -1) : least;
     double axes[3][3];
     int order[3] = { 0, 1, 2 };
     diagonalise(variance, axes);
@@ -92,10 +136,11 @@ typedef struct sums {
 static sums sum_offsets(const trip_neighbours *n, double unit)
 {
     sums s = { .xx = 0 };
+    const double part = 1 / unit;
     for (unsigned i = 0; i < n->count; i++) {
         const double *p = n->nearest[i].position;
-        const double x = (p[0] - n->position[0]) / unit, y = (p[1] - n->position[1]) / unit,
-                     z = (p[2] - n->position[2]) / unit;
+        const double x = (p[0] - n->position[0]) * part, y = (p[1] - n->position[1]) * part,
+                     z = (p[2] - n->position[2]) * part;
         s.offset[0] += x;
         s.offset[1] += y;
         s.offset[2] += z;
