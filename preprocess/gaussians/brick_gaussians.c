@@ -61,10 +61,11 @@ typedef struct bricker {
     trip_output merged;  /* coarse splats by node */
     merging *mergings;   /* one for each depth of the octree */
     size_t mergings_bytes;
-    unsigned depths, merging_room; /* and splats of each buffer */
-    uint64_t *merged_first;        /* of the octree's nodes: first splat in `merged` */
-    uint64_t *counts;              /* of their splats */
-    uint64_t *groups;              /* records by node and class; see group_of() */
+    unsigned depths, merging_room;       /* and splats of each buffer */
+    uint64_t *merged_first;              /* of the octree's nodes: first splat in `merged` */
+    uint64_t *counts;                    /* of their splats */
+    uint64_t *groups;                    /* records by node and class; see group_of() */
+    uint64_t counted_node, counted_left; /* leaf of the splat that is counted next */
     size_t groups_bytes;
     uint8_t *joined; /* class index of the group that a group joins */
     trip_file_gaussian_node *nodes;
@@ -144,6 +145,20 @@ static bool repair(trip_gaussian *g, int degree)
     return true;
 }
 
+static void add_point(bricker *b, const trip_gaussian *g)
+{
+    trip_gaussian_point *to = &b->sample.points[b->sample.count++];
+    memcpy(to->centre, g->centre, sizeof to->centre);
+    to->group = (uint64_t)class_of(g); /* set_groups_of_sample() adds the node */
+}
+
+static int take_room_of_sample(bricker *b, uint64_t records)
+{
+    b->sample_bytes = trip_gaussian_sample_room(records) * sizeof *b->sample.points;
+    b->sample.points = trip_budget_take(b->budget, b->sample_bytes);
+    return b->sample.points ? TRIP_OK : fail_memory(b);
+}
+
 static int spool_splat(bricker *b, trip_gaussian *g)
 {
     unsigned char spilled[sizeof(trip_spilled) + sizeof *g] = { 0 };
@@ -158,12 +173,15 @@ static int spool_splat(bricker *b, trip_gaussian *g)
         b->hi[a] = fmax(b->hi[a], g->centre[a]);
     }
     const int class_index = class_of(g);
+    if (b->p->octree && trip_gaussian_is_sampled(b->records, b->p->octree_records))
+        add_point(b, g);
     b->class_lo = class_index < b->class_lo ? class_index : b->class_lo;
     b->class_hi = class_index > b->class_hi ? class_index : b->class_hi;
     b->records++;
     memcpy(spilled, &head, sizeof head);
     memcpy(spilled + sizeof head, g, sizeof *g);
-    return trip_output_append(&b->spool, spilled, b->stride);
+    const int status = trip_output_append(&b->spool, spilled, b->stride);
+    return status == TRIP_OK && b->p->octree ? trip_gaussian_levels_count(b->levels, g) : status;
 }
 
 static int check_interrupted(const bricker *b)
@@ -204,30 +222,18 @@ static int spool_all(bricker *b)
     return status;
 }
 
-static void add_point(bricker *b, const unsigned char *spilled)
-{
-    trip_gaussian_point *to = &b->sample.points[b->sample.count++];
-    const trip_gaussian *g = (const void *)(spilled + sizeof(trip_spilled));
-    memcpy(to->centre, g->centre, sizeof to->centre);
-    to->group = (uint64_t)class_of(g); /* set_groups_of_sample() adds the node */
-}
-
 /* The encoder's room serves for reading too. */
 static int take_sample(bricker *b)
 {
     unsigned char *buffer = trip_gaussian_encoder_room(b->encoder);
     const uint64_t step = TRIP_GAUSSIAN_BRICK_RECORDS_MAX;
-    int status = TRIP_OK;
-    b->sample_bytes = trip_gaussian_sample_room(b->records) * sizeof *b->sample.points;
-    b->sample.points = trip_budget_take(b->budget, b->sample_bytes);
-    if (!b->sample.points)
-        return fail_memory(b);
+    int status = take_room_of_sample(b, b->records);
     for (uint64_t first = 0; first < b->records && status == TRIP_OK; first += step) {
         const uint64_t left = b->records - first, count = left < step ? left : step;
         status = trip_output_read(&b->spool, first * b->stride, buffer, count * b->stride);
         for (uint64_t i = 0; i < count && status == TRIP_OK; i++)
             if (trip_gaussian_is_sampled(first + i, b->records))
-                add_point(b, buffer + i * b->stride);
+                add_point(b, (const void *)(buffer + i * b->stride + sizeof(trip_spilled)));
         if (status == TRIP_OK)
             status = check_interrupted(b);
     }
@@ -306,25 +312,34 @@ static void widen_classes(bricker *b)
 static void place_in_octree(void *user, const trip_gaussian *g, trip_spilled *head)
 {
     const bricker *b = user;
-    const trip_octree_place p = trip_octree_place_of(&b->octree, g->centre);
-    head->group = trip_octree_leaf(&b->octree, &p, NULL);
-    head->at = (double)trip_octree_order(&p, b->octree.nodes[head->group].depth);
+    trip_octree_set_place(&b->octree, g->centre, head);
 }
 
 /* Counts a splat in the octree's order, and gives it a number in this order. */
 static int count_splat(void *user, const unsigned char *spilled)
 {
     bricker *b = user;
-    trip_spilled head = { .number = b->numbered++ };
+    const trip_spilled head = { .number = b->numbered++ };
     const trip_gaussian *g = (const void *)(spilled + sizeof(trip_spilled));
     tell_progress(b, 1);
-    int status = trip_gaussian_levels_count(b->levels, g, &head.group);
+    int status = trip_gaussian_levels_count(b->levels, g);
     if (status == TRIP_OK)
         status = trip_output_append(&b->ordered, &head, sizeof head);
-    b->groups[group_of(b, head.group, class_of(g))]++;
     return status == TRIP_OK
                ? trip_output_append(&b->ordered, spilled + sizeof head, b->stride - sizeof head)
                : status;
+}
+
+/* Counts splats of the scene by node and class. They come in the octree's order. */
+static void count_groups(bricker *b, const unsigned char *spilled, uint64_t count)
+{
+    for (uint64_t i = 0; i < count; i++, b->counted_left--) {
+        while (b->counted_left == 0)
+            if (!b->octree.nodes[++b->counted_node].children[0])
+                b->counted_left = trip_gaussian_levels_records(b->levels, b->counted_node);
+        const trip_gaussian *g = (const void *)(spilled + i * b->stride + sizeof(trip_spilled));
+        b->groups[group_of(b, b->counted_node, class_of(g))]++;
+    }
 }
 
 static int write_merging(bricker *b, merging *m)
@@ -408,6 +423,8 @@ static int merge_splats(bricker *b)
         const uint64_t left = b->records - first, count = left < step ? left : step;
         status = trip_output_read(&b->spool, first * b->stride, buffer, count * b->stride);
         if (status == TRIP_OK)
+            count_groups(b, buffer, count);
+        if (status == TRIP_OK)
             status = trip_gaussian_levels_merge(b->levels, buffer + sizeof(trip_spilled), b->stride,
                                                 count);
         if (status == TRIP_OK)
@@ -438,8 +455,6 @@ static int order_spool(bricker *b)
     trip_output_close(&b->spool);
     b->spool = b->ordered;
     b->ordered = (trip_output){ .fd = -1 };
-    if (status == TRIP_OK && !trip_gaussian_levels_select(b->levels))
-        status = fail_memory(b);
     return status;
 }
 
@@ -542,24 +557,49 @@ static int make_nodes(bricker *b)
     return TRIP_OK;
 }
 
+static int begin_levels(bricker *b)
+{
+    return trip_gaussian_levels_begin(&b->levels,
+                                      &(trip_gaussian_levels_params){ .octree = &b->octree,
+                                                                      .degree = b->p->degree,
+                                                                      .workers = b->workers,
+                                                                      .emit = emit_coarse,
+                                                                      .user = b },
+                                      b->budget)
+               ? TRIP_OK
+               : fail_memory(b);
+}
+
+/* Builds the octree from the spool. */
+static int order(bricker *b)
+{
+    int status = take_sample(b);
+    if (status == TRIP_OK &&
+        !trip_octree_build(&b->octree, &b->sample, b->records, b->lo, b->hi, b->budget))
+        status = fail_memory(b);
+    if (status == TRIP_OK)
+        status = begin_levels(b);
+    return status == TRIP_OK ? order_spool(b) : status;
+}
+
+/* Receives the splats in the order of the octree. */
+static int spool_ordered(bricker *b)
+{
+    b->octree = *b->p->octree;
+    int status = take_room_of_sample(b, b->p->octree_records);
+    if (status == TRIP_OK)
+        status = begin_levels(b);
+    return status == TRIP_OK ? spool_all(b) : status;
+}
+
 static int make_levels(bricker *b)
 {
-    if (!trip_octree_build(&b->octree, &b->sample, b->records, b->lo, b->hi, b->budget))
-        return fail_memory(b);
     widen_classes(b);
     b->groups_bytes = group_count(b) * (sizeof *b->groups + sizeof *b->joined);
     b->groups = trip_budget_take(b->budget, b->groups_bytes);
     b->joined = (void *)(b->groups + (b->groups ? group_count(b) : 0));
-    if (!b->groups ||
-        !trip_gaussian_levels_begin(&b->levels,
-                                    &(trip_gaussian_levels_params){ .octree = &b->octree,
-                                                                    .degree = b->p->degree,
-                                                                    .workers = b->workers,
-                                                                    .emit = emit_coarse,
-                                                                    .user = b },
-                                    b->budget))
-        return fail_memory(b);
-    int status = order_spool(b);
+    b->counted_node = UINT64_MAX;
+    int status = b->groups && trip_gaussian_levels_select(b->levels) ? TRIP_OK : fail_memory(b);
     if (status == TRIP_OK)
         status = add_levels(b);
     if (status == TRIP_OK)
@@ -749,9 +789,9 @@ static int run_bricker(bricker *b)
     b->folder = p->temporary ? p->temporary : trip_gaussian_writer_folder(b->writer);
     if (!trip_gaussian_encoder_create(&b->encoder, b->writer, b->workers, p->degree, b->budget))
         return fail_memory(b);
-    status = spool_all(b);
-    if (status == TRIP_OK)
-        status = take_sample(b);
+    status = p->octree ? spool_ordered(b) : spool_all(b);
+    if (status == TRIP_OK && !p->octree)
+        status = order(b);
     if (status == TRIP_OK)
         status = find_typical(b);
     if (status == TRIP_OK)
@@ -784,7 +824,8 @@ static void free_bricker(bricker *b)
         trip_budget_release(b->budget, b->groups, b->groups_bytes);
     if (b->nodes)
         trip_budget_release(b->budget, b->nodes, nodes_bytes(b));
-    trip_octree_free(&b->octree);
+    if (!b->p->octree)
+        trip_octree_free(&b->octree);
     trip_palette_free(&b->palette);
     trip_workers_destroy(b->workers);
     free(b);

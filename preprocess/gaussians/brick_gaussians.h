@@ -8,6 +8,7 @@
 
 #include "budget.h"
 #include "gaussian.h"
+#include "gaussian_octree.h"
 
 /* Writes up to `room` splats to `out` and sets *got to their number; 0 means the end. Returns 0 or
  * a negative trip_status after a report. */
@@ -26,6 +27,10 @@ typedef struct trip_brick_gaussians_params {
     bool replace;     /* replaces an existing data set */
     trip_gaussian_source *source;
     void *source_user;
+    /* If the source gives its splats in the order of an octree (gaussian_octree.h), this octree and
+     * the number of splats, at most. Otherwise NULL and 0. */
+    const trip_octree *octree;
+    uint64_t octree_records;
     const char *source_name; /* for messages; NULL means `path` */
     int degree;              /* of the spherical harmonics that are kept, 0 to 3 */
     trip_brick_harmonics harmonics;

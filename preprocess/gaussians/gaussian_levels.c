@@ -261,16 +261,16 @@ static int keep_whole(trip_gaussian_levels *l, const trip_gaussian *g, int mergi
 
 /* Adds a Gaussian. `own` has its moments; in the first pass only the number, 1. */
 static int add(trip_gaussian_levels *l, const trip_gaussian *g, bool has_mass,
-               const trip_gaussian_moments *own, uint64_t *leaf)
+               const trip_gaussian_moments *own)
 {
     const trip_octree_place place = trip_octree_place_of(l->p.octree, g->centre);
     int status = l->any ? close_below(l, trip_octree_common(&l->place, &place)) : TRIP_OK;
-    *leaf = trip_octree_leaf(l->p.octree, &place, l->path);
+    const uint64_t leaf = trip_octree_leaf(l->p.octree, &place, l->path);
     l->any = true;
     l->place = place;
-    l->depth = l->p.octree->nodes[*leaf].depth;
+    l->depth = l->p.octree->nodes[leaf].depth;
     if (!l->merges)
-        l->parts[*leaf].records++;
+        l->parts[leaf].records++;
     if (status < 0 || g->opacity * 255 <= 1)
         return status;
     const int merging = has_mass ? merging_depth(l, g, l->depth + TRIP_LEVEL_HALVINGS - 1) : -1;
@@ -279,10 +279,10 @@ static int add(trip_gaussian_levels *l, const trip_gaussian *g, bool has_mass,
     return keep_whole(l, g, merging);
 }
 
-int trip_gaussian_levels_count(trip_gaussian_levels *l, const trip_gaussian *g, uint64_t *leaf)
+int trip_gaussian_levels_count(trip_gaussian_levels *l, const trip_gaussian *g)
 {
-    const trip_gaussian_moments one = { .count = 1 };
-    return add(l, g, trip_gaussian_has_mass(g), &one, leaf);
+    static const trip_gaussian_moments one = { .count = 1 };
+    return add(l, g, trip_gaussian_has_mass(g), &one);
 }
 
 int trip_gaussian_levels_merge(trip_gaussian_levels *l, const unsigned char *splats, size_t stride,
@@ -301,9 +301,7 @@ int trip_gaussian_levels_merge(trip_gaussian_levels *l, const unsigned char *spl
             status = start_loop(l, splats + (at + n) * stride,
                                 left - n < l->batch ? left - n : l->batch);
         for (size_t i = 0; i < n && status == TRIP_OK; i++) {
-            uint64_t leaf;
-            status =
-                add(l, (const void *)(splats + (at + i) * stride), own[i].mass > 0, &own[i], &leaf);
+            status = add(l, (const void *)(splats + (at + i) * stride), own[i].mass > 0, &own[i]);
         }
     }
     return status;

@@ -29,8 +29,8 @@ typedef struct trip_gaussian_levels_params {
 /* Returns false if the budget is too small. */
 bool trip_gaussian_levels_begin(trip_gaussian_levels **out,
                                 const trip_gaussian_levels_params *params, trip_budget *budget);
-/* Counts the next Gaussian of the first pass, and sets *leaf to its leaf. */
-int trip_gaussian_levels_count(trip_gaussian_levels *l, const trip_gaussian *g, uint64_t *leaf);
+/* Counts the next Gaussian of the first pass. */
+int trip_gaussian_levels_count(trip_gaussian_levels *l, const trip_gaussian *g);
 /* Ends the first pass and selects the nodes. Returns false if the budget is too small. */
 bool trip_gaussian_levels_select(trip_gaussian_levels *l);
 /* Merges the next Gaussians of the second pass. They are `stride` bytes apart and have only the

@@ -53,6 +53,13 @@ uint64_t trip_octree_order(const trip_octree_place *p, unsigned depth)
     return order;
 }
 
+void trip_octree_set_place(const trip_octree *o, const double centre[3], trip_spilled *head)
+{
+    const trip_octree_place p = trip_octree_place_of(o, centre);
+    head->group = trip_octree_leaf(o, &p, NULL);
+    head->at = (double)trip_octree_order(&p, o->nodes[head->group].depth);
+}
+
 unsigned trip_octree_common(const trip_octree_place *p, const trip_octree_place *q)
 {
     uint64_t differ = 0;

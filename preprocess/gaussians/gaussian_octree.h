@@ -5,6 +5,7 @@
 #define TRIP_GAUSSIAN_OCTREE_H
 
 #include "budget.h"
+#include "gaussian_sort.h"
 #include "gaussian_tree.h"
 
 enum {
@@ -41,6 +42,8 @@ trip_octree_place trip_octree_place_of(const trip_octree *o, const double centre
 uint64_t trip_octree_leaf(const trip_octree *o, const trip_octree_place *p, uint64_t *path);
 /* Returns a number that orders the places in a leaf by the octree's next 8 halvings. */
 uint64_t trip_octree_order(const trip_octree_place *p, unsigned depth);
+/* Sets group and coordinate for a sort in the octree's order: the leaf, and the place in it. */
+void trip_octree_set_place(const trip_octree *o, const double centre[3], trip_spilled *head);
 /* Returns how many halvings two places have in common, at most TRIP_OCTREE_BITS. */
 unsigned trip_octree_common(const trip_octree_place *p, const trip_octree_place *q);
 

@@ -36,10 +36,12 @@ typedef struct bricker {
     trip_gaussian_sample sample;
     double *values; /* of the sample */
     size_t sample_bytes, values_bytes;
+    double all_lo[3], all_hi[3];     /* bounds */
     double lo[3], hi[3], radius_max; /* typical bounds */
     double seen_from[3];             /* or zero: normals point away from the middle */
     bool outwards;
     trip_point_palette palette;
+    trip_octree octree;
     trip_point_tiles *tiles;
     trip_workers *workers;
     trip_point_row *rows;  /* of the tiles from first_tile on, TRIP_POINT_TILE_MAX each */
@@ -109,6 +111,10 @@ static int spool_point(bricker *b, const trip_point *p)
         set_value(&row, trip_point_value(b->p->colouring, p, b->p->up));
     b->lacking = b->lacking || !(row.radius > 0) ||
                  (row.normal[0] == 0 && row.normal[1] == 0 && row.normal[2] == 0);
+    for (int a = 0; a < 3; a++) {
+        b->all_lo[a] = fmin(b->all_lo[a], p->position[a]);
+        b->all_hi[a] = fmax(b->all_hi[a], p->position[a]);
+    }
     if (trip_gaussian_is_sampled(b->records, b->info->points))
         add_to_sample(b, &row);
     if (++b->records % TELL_EVERY == 0)
@@ -293,10 +299,13 @@ static size_t rows_bytes(const bricker *b)
 static int prepare_tiles(bricker *b)
 {
     int status = trip_workers_create(&b->workers, b->p->threads);
+    if (status == 0 &&
+        !trip_octree_build(&b->octree, &b->sample, b->records, b->all_lo, b->all_hi, b->budget))
+        status = fail_memory(b);
     const trip_point_tiles_params params = { .spool = &b->spool,
                                              .workers = b->workers,
                                              .records = b->records,
-                                             .sample = &b->sample,
+                                             .octree = &b->octree,
                                              .folder = b->folder,
                                              .name = b->p->path,
                                              .progress = note_sorted,
@@ -435,6 +444,8 @@ static int brick_surfels(bricker *b, trip_brick_gaussians_result *result)
             .source = give_surfels,
             .source_user = b,
             .source_name = p->file_name,
+            .octree = b->lacking ? &b->octree : NULL,
+            .octree_records = b->lacking ? b->records : 0,
             .flags = p->flags | TRIP_GAUSSIAN_FLAT | TRIP_GAUSSIAN_CLOUD |
                      (p->colouring == TRIP_POINT_BY_RGB ? 0 : TRIP_GAUSSIAN_SHADED),
             .text = p->text,
@@ -470,11 +481,17 @@ int trip_brick_points(const trip_brick_points_params *params, trip_budget *budge
                       trip_brick_gaussians_result *result)
 {
     bricker b = {
-        .p = params, .info = trip_point_file_info(params->file), .budget = budget, .spool.fd = -1
+        .p = params,
+        .info = trip_point_file_info(params->file),
+        .budget = budget,
+        .spool.fd = -1,
+        .all_lo = { INFINITY, INFINITY, INFINITY },
+        .all_hi = { -INFINITY, -INFINITY, -INFINITY },
     };
     const int status = run(&b, result);
     release_tiles(&b);
     release_sample(&b);
+    trip_octree_free(&b.octree);
     trip_output_close(&b.spool);
     trip_point_palette_free(&b.palette);
     free(b.folder);

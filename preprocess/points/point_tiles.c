@@ -1,7 +1,6 @@
 #include "point_tiles.h"
 
 #include <math.h>
-#include <stdatomic.h>
 #include <pthread.h>
 #include <stdlib.h>
 #include <string.h>
@@ -12,6 +11,10 @@
 
 /* Positions near a tile, at most, for the fast searches. */
 enum { CANDIDATES_MAX = 4 * TRIP_POINT_TILE_MAX };
+
+/* A tile of so many points ends at the border of an octant, one of twice as many at the border of
+ * an octant of half the size. */
+enum { TILE_SMALL = 1536, OCTANTS = 2, PLACE_BITS = 24, TILES_FIRST = 64 };
 
 enum { FAN = 8, LEVELS_MAX = 24, SLOTS_MAX = 4096, SORTED_BYTES = 1 << 17, TELL_EVERY = 1 << 14 };
 
@@ -54,11 +57,11 @@ struct trip_point_tiles {
     trip_point_tiles_params params;
     trip_budget *budget;
     trip_output rows; /* sorted */
-    trip_gaussian_tree tree;
     trip_point_tile *tiles;
-    size_t tiles_bytes;
+    size_t tiles_bytes, tile_room;
     uint64_t tile_count;
-    uint64_t leaf, leaf_left; /* of the row that comes next, and its rows that are left */
+    uint64_t leaf; /* of the last row, and its place in the leaf */
+    uint32_t place;
     uint64_t passed;
     /* Boxes of FAN consecutive tiles, of FAN such boxes, and so on up to one box. */
     box *boxes;
@@ -87,39 +90,67 @@ static int fail_memory(const trip_point_tiles *t)
 
 /* ---- sorting ---- */
 
-static size_t room_of_tiles(const trip_point_tiles *t)
+/* Takes room for twice as many tiles. */
+static int add_room(trip_point_tiles *t)
 {
-    return (t->tree.leaf_count + t->params.records / TRIP_POINT_TILE_MAX + 1) * sizeof *t->tiles;
+    const size_t room = t->tile_room ? 2 * t->tile_room : TILES_FIRST;
+    trip_point_tile *tiles = trip_budget_take(t->budget, room * sizeof *tiles);
+    if (!tiles)
+        return fail_memory(t);
+    if (t->tiles) {
+        memcpy(tiles, t->tiles, t->tile_count * sizeof *tiles);
+        trip_budget_release(t->budget, t->tiles, t->tiles_bytes);
+    }
+    t->tiles = tiles;
+    t->tile_room = room;
+    t->tiles_bytes = room * sizeof *tiles;
+    return 0;
 }
 
-/* A leaf with too many rows becomes several tiles with about equal numbers. */
-static void begin_tile(trip_point_tiles *t, const trip_point_row *row)
+static int begin_tile(trip_point_tiles *t, const trip_point_row *row)
 {
-    if (t->leaf_left == 0)
-        t->leaf_left = t->tree.leaves[row->head.group].records;
-    const uint64_t pieces = (t->leaf_left + TRIP_POINT_TILE_MAX - 1) / TRIP_POINT_TILE_MAX;
+    const int status = t->tile_count == t->tile_room ? add_room(t) : 0;
+    if (status < 0)
+        return status;
     trip_point_tile *tile = &t->tiles[t->tile_count++];
-    *tile = (trip_point_tile){ .first = t->passed,
-                               .reserved = (uint32_t)((t->leaf_left + pieces - 1) / pieces) };
+    *tile = (trip_point_tile){ .first = t->passed };
     memcpy(tile->lo, row->position, sizeof tile->lo);
     memcpy(tile->hi, row->position, sizeof tile->hi);
+    return 0;
+}
+
+/* Whether a tile ends before a row. It lies in one leaf of the octree. It ends at the border of an
+ * octant of the leaf if it is not small, and so on for smaller octants. */
+static bool ends_before(const trip_point_tiles *t, uint64_t leaf, uint32_t place)
+{
+    const uint32_t count = t->tiles[t->tile_count - 1].count;
+    if (leaf != t->leaf || count == TRIP_POINT_TILE_MAX)
+        return true;
+    for (unsigned depth = 1; depth <= OCTANTS; depth++)
+        if (place >> (PLACE_BITS - 3 * depth) != t->place >> (PLACE_BITS - 3 * depth))
+            return count >= (uint32_t)TILE_SMALL << (depth - 1);
+    return false;
 }
 
 static int add_row(void *user, const unsigned char *spilled)
 {
     trip_point_tiles *t = user;
     const trip_point_row *row = (const void *)spilled;
-    trip_point_tile *tile = &t->tiles[t->tile_count ? t->tile_count - 1 : 0];
-    if (t->tile_count == 0 || tile->count == tile->reserved) {
-        begin_tile(t, row);
-        tile = &t->tiles[t->tile_count - 1];
-    }
+    const uint32_t place = (uint32_t)row->head.at;
+    int status = 0;
+    if (t->tile_count == 0 || ends_before(t, row->head.group, place))
+        status = begin_tile(t, row);
+    if (status < 0)
+        return status;
+    trip_point_tile *tile = &t->tiles[t->tile_count - 1];
+    t->leaf = row->head.group;
+    t->place = place;
     for (int a = 0; a < 3; a++) {
-        tile->lo[a] = fmin(tile->lo[a], row->position[a]);
-        tile->hi[a] = fmax(tile->hi[a], row->position[a]);
+        const double at = row->position[a];
+        tile->lo[a] = at < tile->lo[a] ? at : tile->lo[a];
+        tile->hi[a] = at > tile->hi[a] ? at : tile->hi[a];
     }
     tile->count++;
-    t->leaf_left--;
     if (++t->passed % TELL_EVERY == 0 && t->params.progress)
         t->params.progress(t->params.user, t->passed);
     return trip_output_append(&t->rows, row, sizeof *row);
@@ -128,14 +159,7 @@ static int add_row(void *user, const unsigned char *spilled)
 static void place_row(void *user, const trip_gaussian *row, trip_spilled *head)
 {
     const trip_point_tiles *t = user;
-    head->group = trip_gaussian_tree_leaf(&t->tree, row->centre, 0);
-    head->at = row->centre[0];
-}
-
-static void count_rows(void *user, uint64_t leaf, uint64_t rows)
-{
-    trip_point_tiles *t = user;
-    atomic_fetch_add_explicit(&t->tree.leaves[leaf].records, rows, memory_order_relaxed);
+    trip_octree_set_place(t->params.octree, row->centre, head);
 }
 
 static int sort(trip_point_tiles *t)
@@ -147,24 +171,18 @@ static int sort(trip_point_tiles *t)
                                                            .buffer_bytes = SORTED_BYTES,
                                                            .unnamed = true },
                                     t->budget);
-    if (status < 0)
-        return status;
-    if (!trip_gaussian_tree_build(&t->tree, p->sample, 0, &p->records, 1, t->budget))
-        return fail_memory(t);
-    t->tiles_bytes = room_of_tiles(t);
-    t->tiles = trip_budget_take(t->budget, t->tiles_bytes);
-    if (!t->tiles)
-        return fail_memory(t);
-    status = trip_gaussian_sort(&(trip_gaussian_sort_params){ .spool = p->spool,
-                                                              .workers = p->workers,
-                                                              .records = p->records,
-                                                              .place = place_row,
-                                                              .count = count_rows,
-                                                              .folder = p->folder,
-                                                              .path = p->name,
-                                                              .emit = add_row,
-                                                              .user = t },
-                                t->budget);
+    if (status == 0)
+        status = add_room(t);
+    if (status == 0)
+        status = trip_gaussian_sort(&(trip_gaussian_sort_params){ .spool = p->spool,
+                                                                  .workers = p->workers,
+                                                                  .records = p->records,
+                                                                  .place = place_row,
+                                                                  .folder = p->folder,
+                                                                  .path = p->name,
+                                                                  .emit = add_row,
+                                                                  .user = t },
+                                    t->budget);
     return status == 0 ? trip_output_flush(&t->rows) : status;
 }
 
@@ -216,7 +234,6 @@ int trip_point_tiles_make(trip_point_tiles **out, const trip_point_tiles_params 
     int status = sort(t);
     if (status == 0)
         status = make_boxes(t);
-    trip_gaussian_tree_free(&t->tree);
     if (status < 0) {
         trip_point_tiles_free(t);
         *out = NULL;

@@ -1,13 +1,13 @@
-/* A cloud on disk, sorted into tiles of neighbouring points. Threads search the tiles for nearest
- * neighbours. Each search is exact: it goes on to other tiles as far as their bounds are near
- * enough. Tiles depend on the points alone, not on the memory. */
+/* A cloud on disk, in the order of an octree, and divided into tiles of neighbouring points.
+ * Threads search the tiles for nearest neighbours. Each search is exact: it goes on to other tiles
+ * as far as their bounds are near enough. Tiles depend on the points alone, not on the memory. */
 #ifndef TRIP_POINT_TILES_H
 #define TRIP_POINT_TILES_H
 
 #include <assert.h>
 
+#include "gaussian_octree.h"
 #include "gaussian_sort.h"
-#include "gaussian_tree.h"
 #include "neighbours.h"
 
 enum { TRIP_POINT_TILE_MAX = 6144 };
@@ -41,9 +41,9 @@ typedef struct trip_point_tiles_params {
     const trip_output *spool; /* of trip_point_row, flushed */
     trip_workers *workers;    /* no loop runs */
     uint64_t records;
-    const trip_gaussian_sample *sample; /* of the positions, all of group 0 */
-    const char *folder;                 /* for temporary files */
-    const char *name;                   /* of the cloud, for messages */
+    const trip_octree *octree; /* of the positions; it must outlive the tiles */
+    const char *folder;        /* for temporary files */
+    const char *name;          /* of the cloud, for messages */
     void (*progress)(void *user, uint64_t rows);
     void *user;
 } trip_point_tiles_params;
