@@ -505,6 +505,7 @@ static int print_scene(const options *o, const triptych_gaussians *g, uint64_t b
         cJSON_AddStringToObject(root, "format", g->format);
         add_number(root, "gaussians", (double)g->count);
         add_number(root, "left_out", (double)g->left_out);
+        add_number(root, "outliers", (double)g->outliers);
         add_number(root, "degree", g->degree);
         add_number(root, "coarse_gaussians", (double)g->coarse);
         add_number(root, "palette_entries", (double)g->palette);

@@ -90,27 +90,28 @@ int triptych_describe_points(triptych *t, const char *path, triptych_points *out
 /* ---- bricking ---- */
 
 _Static_assert((int)TRIPTYCH_POINT_COLOUR_AUTO == (int)TRIP_POINT_BY_AUTO &&
-                   (int)TRIPTYCH_POINT_COLOUR_TIME == (int)TRIP_POINT_BY_TIME,
+                   (int)TRIPTYCH_POINT_COLOUR_DENSITY == (int)TRIP_POINT_BY_DENSITY,
                "the library's colours are those of point_colour.h");
 
 static bool has_options(const triptych_brick_options *o)
 {
     return o->point_colour || o->point_neighbours || o->point_radius != 0 ||
-           o->point_radius_factor != 0;
+           o->point_radius_factor != 0 || o->point_outliers != 0;
 }
 
 int trip_context_check_no_points(const char *path, const triptych_brick_options *o)
 {
-    return has_options(o) ? trip_fail(TRIP_USAGE, "brick", path,
-                                      "is no cloud of points; --color, --k and --radius apply to "
-                                      "clouds of points only")
-                          : 0;
+    return has_options(o)
+               ? trip_fail(TRIP_USAGE, "brick", path,
+                           "is no cloud of points; --color, --k, --radius and --outliers "
+                           "apply to clouds of points only")
+               : 0;
 }
 
 static const char *fault_of(const triptych_brick_options *o)
 {
     if (o->point_colour < TRIPTYCH_POINT_COLOUR_AUTO ||
-        o->point_colour > TRIPTYCH_POINT_COLOUR_TIME)
+        o->point_colour > TRIPTYCH_POINT_COLOUR_DENSITY)
         return "unknown colour of points";
     if (o->point_neighbours &&
         (o->point_neighbours < TRIP_NEIGHBOURS_MIN || o->point_neighbours > TRIP_NEIGHBOURS_MAX))
@@ -118,6 +119,8 @@ static const char *fault_of(const triptych_brick_options *o)
     if (!(o->point_radius >= 0 && o->point_radius <= 1e12 && o->point_radius_factor >= 0 &&
           o->point_radius_factor <= 1e6))
         return "the radius of points must be at least 0, up to 1e12, and its factor up to 1e6";
+    if (!(o->point_outliers >= 0 && o->point_outliers <= 1000))
+        return "outliers are points beyond 0 to 1000 deviations";
     if (o->axes && !trip_anatomy_axes_valid(o->axes))
         return "the axes must be three letters: one of R and L, one of A and P, one of S and I";
     return NULL;
@@ -127,8 +130,8 @@ int trip_context_describe_points_form(const char *path, const triptych_brick_opt
                                       char text[256])
 {
     const char *fault = fault_of(o);
-    snprintf(text, 256, "points %d %u %a %a %s\n", (int)o->point_colour, o->point_neighbours,
-             o->point_radius, o->point_radius_factor, o->axes ? o->axes : "");
+    snprintf(text, 256, "points %d %u %a %a %a %s\n", (int)o->point_colour, o->point_neighbours,
+             o->point_radius, o->point_radius_factor, o->point_outliers, o->axes ? o->axes : "");
     return fault ? trip_fail(TRIP_USAGE, "brick", path, "%s", fault) : 0;
 }
 
@@ -173,6 +176,8 @@ static int brick_file(triptych *t, trip_point_file *f, const char *path, const c
                                         .neighbours = o->point_neighbours,
                                         .radius = o->point_radius,
                                         .radius_factor = o->point_radius_factor,
+                                        .outliers = o->point_outliers,
+                                        .outliers_out = &out->outliers,
                                         .threads = trip_context_threads(o->threads),
                                         .progress = show_rows,
                                         .progress_user = t };

@@ -70,6 +70,7 @@ typedef enum triptych_point_colour {
     TRIPTYCH_POINT_COLOUR_CLASSIFICATION, /* a fixed colour for each class of LAS */
     TRIPTYCH_POINT_COLOUR_RETURN,         /* by the colours of viridis */
     TRIPTYCH_POINT_COLOUR_TIME,           /* by the colours of viridis */
+    TRIPTYCH_POINT_COLOUR_DENSITY,        /* by the colours of viridis */
 } triptych_point_colour;
 
 typedef struct triptych_range {
@@ -151,6 +152,9 @@ typedef struct triptych_brick_options {
     /* Radius of all points, in units of the cloud. Default: from the file or from neighbours. */
     double point_radius;
     double point_radius_factor; /* multiplies all radii; default: 1 */
+    /* Leaves out a point if the mean distance of its neighbours exceeds the mean over all points by
+     * more than this many standard deviations, up to 1000. Default: keeps all points. */
+    double point_outliers;
 
     /* ---- the opacity envelope: the union of the following; `automatic` if none is given ---- */
 
@@ -321,6 +325,7 @@ typedef struct triptych_gaussians {
     char up[3];        /* the axis that points up: "x", "y", "z", or with a minus */
     uint64_t count;    /* of Gaussians, without those that are left out */
     uint64_t left_out; /* Gaussians with a value that is not finite */
+    uint64_t outliers; /* points that triptych_brick_options.point_outliers left out */
     int degree;        /* of spherical harmonics, 0 to 3 */
     uint64_t coarse;   /* Gaussians of coarse levels; 0 before bricking, like the next two */
     uint64_t palette;  /* entries of the palette of harmonics; 0 without one */

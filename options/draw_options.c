@@ -291,9 +291,11 @@ static int read_radius(const trip_option *row, const char *text, void *base)
     return 0;
 }
 
-static const char *const point_colours[] = { "auto",           "rgb",    "intensity", "height",
-                                             "classification", "return", "time",      NULL };
-_Static_assert(TRIPTYCH_POINT_COLOUR_AUTO == 0 && TRIPTYCH_POINT_COLOUR_TIME == 6, "point_colours");
+static const char *const point_colours[] = {
+    "auto", "rgb", "intensity", "height", "classification", "return", "time", "density", NULL
+};
+_Static_assert(TRIPTYCH_POINT_COLOUR_AUTO == 0 && TRIPTYCH_POINT_COLOUR_DENSITY == 7,
+               "point_colours");
 
 static const char *const level_sets[] = { "filled", "band", NULL };
 
@@ -339,8 +341,7 @@ static const trip_option volume_rows[] = {
 static const trip_option point_rows[] = {
     { "color", "HOW",
       "Colors the points by rgb (their own colors), intensity, height, "
-      "classification, return or "
-      "time",
+      "classification, return, time or density",
       "auto: rgb, else intensity, else height", .group = DRAW_GROUP_POINTS,
       .type = TRIP_OPTION_CHOICE, AT(point_colour), .choices = point_colours },
     { "k", "N",
@@ -348,6 +349,11 @@ static const trip_option point_rows[] = {
       "without them: 3 to 64",
       "12", .group = DRAW_GROUP_POINTS, .type = TRIP_OPTION_INTEGER, AT(point_neighbours), .lo = 3,
       .hi = 64 },
+    { "outliers", "N",
+      "Leaves out points whose neighbours are farther away on average than the mean of all points "
+      "and N standard deviations",
+      "keeps all points", .group = DRAW_GROUP_POINTS, .type = TRIP_OPTION_ABOVE, AT(point_outliers),
+      .lo = 0, .hi = 1000 },
     { "radius", "R|Fx",
       "Sets the radius of all points, in units of the cloud, or multiplies "
       "all radii by F",

@@ -1,5 +1,6 @@
 #include "brick_points.h"
 
+#include <inttypes.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -50,6 +51,9 @@ typedef struct bricker {
     unsigned tile; /* of the ready ones that is given out, and its row */
     uint32_t row;
     uint64_t given; /* rows of the spool, without tiles */
+    /* Mean and sum of squares of the spreads, and the greatest spread that is kept. */
+    double spread_mean, spread_squares, spread_max;
+    uint64_t outliers;
 } bricker;
 
 static int fail_memory(const bricker *b)
@@ -58,11 +62,24 @@ static int fail_memory(const bricker *b)
                      "bricking needs more memory than --memory allows: raise --memory");
 }
 
+/* Whether the values of the points come from their neighbours. */
+static bool has_late_values(const bricker *b)
+{
+    return b->p->colouring == TRIP_POINT_BY_DENSITY;
+}
+
+/* Whether all rows are completed before the first one is given out. */
+static bool completes_first(const bricker *b)
+{
+    return b->p->outliers > 0 || has_late_values(b);
+}
+
 static void tell(void *user, uint64_t more)
 {
     const bricker *b = user;
+    const uint64_t passes = PASSES + completes_first(b);
     if (b->p->progress)
-        b->p->progress(b->p->progress_user, b->passed + more, PASSES * b->info->points);
+        b->p->progress(b->p->progress_user, b->passed + more, passes * b->info->points);
 }
 
 /* ---- reading ---- */
@@ -203,6 +220,16 @@ static void choose_side(bricker *b, double diagonal)
     }
 }
 
+/* Makes the palette from the values of the sample. */
+static int make_palette(bricker *b, double lo, double hi)
+{
+    if (b->p->colouring == TRIP_POINT_BY_RETURN) {
+        lo = 1;
+        hi = b->info->returns_max;
+    }
+    return trip_point_palette_make(&b->palette, b->p->colouring, lo, hi);
+}
+
 static int look_at_sample(bricker *b)
 {
     const uint64_t count = b->sample.count;
@@ -222,11 +249,7 @@ static int look_at_sample(bricker *b)
     b->radius_max =
         diagonal > 0 ? diagonal * fmin(1, fmax(LEAST, FEW / sqrt((double)b->records))) : 1;
     choose_side(b, diagonal);
-    if (b->p->colouring == TRIP_POINT_BY_RETURN) {
-        value_lo = 1;
-        value_hi = b->info->returns_max;
-    }
-    return trip_point_palette_make(&b->palette, b->p->colouring, value_lo, value_hi);
+    return has_late_values(b) ? 0 : make_palette(b, value_lo, value_hi);
 }
 
 /* ---- radii and normals ---- */
@@ -249,6 +272,9 @@ static bool has_normal(const trip_point_row *row)
 static void complete_row(const bricker *b, const trip_neighbours *n, trip_point_row *row)
 {
     double towards[3];
+    row->spread = (float)trip_surfel_spread(n);
+    if (has_late_values(b))
+        set_value(row, log10(trip_surfel_density(n)));
     if (has_normal(row) && row->radius > 0)
         return;
     find_towards(b, row, towards);
@@ -342,6 +368,83 @@ static void release_tiles(bricker *b)
     b->rows = NULL;
 }
 
+/* ---- completed rows ---- */
+
+/* Adds a row to the statistics (Welford 1962). */
+static void note_row(bricker *b, const trip_point_row *row, uint64_t number)
+{
+    const double spread = (double)row->spread, apart = spread - b->spread_mean;
+    b->spread_mean += apart / (double)number;
+    b->spread_squares += apart * (spread - b->spread_mean);
+    if (has_late_values(b) && trip_gaussian_is_sampled(row->head.number, b->info->points))
+        b->values[b->sample.count++] = value_of(row);
+}
+
+static int spool_tiles(bricker *b, trip_output *rows)
+{
+    uint64_t number = 0;
+    int status = complete_tiles(b);
+    while (status == 0 && b->ready > 0) {
+        for (unsigned t = 0; t < b->ready && status == 0; t++) {
+            const trip_point_row *from = &b->rows[(size_t)t * TRIP_POINT_TILE_MAX];
+            const uint32_t count = trip_point_tiles_at(b->tiles, b->next_tile + t)->count;
+            for (uint32_t i = 0; i < count; i++)
+                note_row(b, &from[i], ++number);
+            status = trip_output_append(rows, from, count * sizeof *from);
+        }
+        tell(b, number);
+        if (status == 0)
+            status = complete_tiles(b);
+    }
+    b->passed += number;
+    return status == 0 ? trip_output_flush(rows) : status;
+}
+
+/* Makes the palette of values that came from neighbours. */
+static int make_late_palette(bricker *b)
+{
+    const uint64_t count = b->sample.count;
+    const size_t bytes = 2 * (count + 1) * sizeof(trip_key);
+    double lo = 0, hi = 0;
+    trip_key *keys = trip_budget_take(b->budget, bytes);
+    if (!keys)
+        return fail_memory(b);
+    if (count > 0)
+        typical(keys, count, &lo, &hi, b, 3);
+    trip_budget_release(b->budget, keys, bytes);
+    return make_palette(b, lo, hi);
+}
+
+/* Completes all rows before the first one is given out, since a choice depends on all of them. The
+ * spool then holds them in the order of the tiles. */
+static int complete_first(bricker *b)
+{
+    trip_output rows = { .fd = -1 };
+    b->sample.count = 0; /* the tiles exist */
+    int status = trip_output_create(&rows,
+                                    &(trip_output_params){ .folder = b->folder,
+                                                           .name = TRIP_SPOOL_NAME,
+                                                           .buffer_bytes = SPOOL_BYTES,
+                                                           .unnamed = true },
+                                    b->budget);
+    if (status == 0)
+        status = spool_tiles(b, &rows);
+    release_tiles(b);
+    b->spool = rows;
+    b->lacking = false; /* the rows are complete */
+    if (b->p->outliers > 0 && b->records > 1)
+        b->spread_max =
+            b->spread_mean + b->p->outliers * sqrt(b->spread_squares / (double)(b->records - 1));
+    return status == 0 && has_late_values(b) ? make_late_palette(b) : status;
+}
+
+static bool is_outlier(bricker *b, const trip_point_row *row)
+{
+    const bool far = b->spread_max > 0 && (double)row->spread > b->spread_max;
+    b->outliers += far;
+    return far;
+}
+
 /* ---- surfels ---- */
 
 /* Sets a rotation that takes the third axis to a normal of unit length. */
@@ -404,7 +507,8 @@ static int next_of_spool(bricker *b, trip_gaussian *out, size_t room, size_t *go
         if (status < 0)
             return status;
         for (size_t i = 0; i < count; i++)
-            make_surfel(b, &rows[i], &out[(*got)++]);
+            if (!is_outlier(b, &rows[i]))
+                make_surfel(b, &rows[i], &out[(*got)++]);
         b->given += count;
     }
     return 0;
@@ -465,16 +569,28 @@ static int run(bricker *b, trip_brick_gaussians_result *result)
         status = spool_all(b);
     if (status == 0)
         status = look_at_sample(b);
-    if (status == 0 && b->lacking && !trip_neighbour_trees_exist())
+    const bool first = completes_first(b);
+    if (status == 0 && (b->lacking || first) && !trip_neighbour_trees_exist())
         status = trip_fail(TRIP_ERROR, "brick", b->p->file_name,
-                           "lacks radii or normals, and this program was built without nanoflann, "
-                           "which finds neighbours");
-    if (status == 0 && b->lacking) {
+                           "needs neighbours, for radii, normals, outliers or density, but this "
+                           "program was built without nanoflann, which finds them");
+    if (status == 0 && (b->lacking || first)) {
         status = prepare_tiles(b);
         trip_output_close(&b->spool);
         b->spool = (trip_output){ .fd = -1 };
     }
-    return status == 0 ? brick_surfels(b, result) : status;
+    if (status == 0 && first)
+        status = complete_first(b);
+    if (status == 0)
+        status = brick_surfels(b, result);
+    if (status == 0 && b->outliers)
+        trip_note(b->p->file_name,
+                  "%" PRIu64 " of %" PRIu64 " points are outliers, on average more than %g away "
+                  "from their neighbours; they are left out",
+                  b->outliers, b->records, b->spread_max);
+    if (b->p->outliers_out)
+        *b->p->outliers_out = b->outliers;
+    return status;
 }
 
 int trip_brick_points(const trip_brick_points_params *params, trip_budget *budget,

@@ -26,6 +26,10 @@ typedef struct trip_brick_points_params {
     unsigned neighbours;            /* default: TRIP_POINT_NEIGHBOURS */
     double radius;                  /* of all points; 0: of the file, or from neighbours */
     double radius_factor;           /* default: 1 */
+    /* Leaves out points with neighbours farther away on average than the mean of all points and
+     * this many standard deviations (Rusu et al. 2008). 0 keeps all points. */
+    double outliers;
+    uint64_t *outliers_out; /* their number; or NULL */
     unsigned threads;
     /* Called by the bricking thread with the number of rows that have passed, and of all. */
     void (*progress)(void *user, uint64_t passed, uint64_t all);

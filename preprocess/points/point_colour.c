@@ -15,6 +15,7 @@ static const struct {
     [TRIP_POINT_BY_CLASSIFICATION] = { "classes", TRIP_POINT_CLASSIFICATION },
     [TRIP_POINT_BY_RETURN] = { "returns", TRIP_POINT_RETURNS },
     [TRIP_POINT_BY_TIME] = { "GPS times", TRIP_POINT_TIME },
+    [TRIP_POINT_BY_DENSITY] = { "density", 0 },
 };
 
 /* The classes of LAS 1.4, table 17. Bytes: red, green, blue. Further classes have the last colour.
@@ -90,7 +91,8 @@ double trip_point_value(trip_point_colouring by, const trip_point *p, const doub
 int trip_point_palette_make(trip_point_palette *p, trip_point_colouring by, double lo, double hi)
 {
     *p = (trip_point_palette){ .by = by, .lo = lo, .hi = hi };
-    if (by != TRIP_POINT_BY_HEIGHT && by != TRIP_POINT_BY_RETURN && by != TRIP_POINT_BY_TIME)
+    if (by != TRIP_POINT_BY_HEIGHT && by != TRIP_POINT_BY_RETURN && by != TRIP_POINT_BY_TIME &&
+        by != TRIP_POINT_BY_DENSITY)
         return 0;
     const int status = trip_tf_load(&p->tf, "preset:viridis");
     if (status == 0)

@@ -13,6 +13,7 @@ typedef enum trip_point_colouring {
     TRIP_POINT_BY_CLASSIFICATION, /* a fixed colour for each class of LAS */
     TRIP_POINT_BY_RETURN,         /* viridis, by the number of the return */
     TRIP_POINT_BY_TIME,           /* viridis */
+    TRIP_POINT_BY_DENSITY,        /* viridis, by the logarithm of surfel_shape.h's density */
 } trip_point_colouring;
 
 /* Chooses the colouring of a surveyed cloud. Fails if the cloud lacks the wanted

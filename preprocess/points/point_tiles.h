@@ -22,7 +22,7 @@ typedef struct trip_point_row {
     float normal[3]; /* 0, 0, 0: none */
     float radius;    /* 0: none */
     float colour[3]; /* or a value, which a palette colours */
-    float reserved;
+    float spread;    /* mean distance of the neighbours; 0 until they are found */
 } trip_point_row;
 
 static_assert(offsetof(trip_point_row, deviations) ==

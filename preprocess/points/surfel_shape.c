@@ -195,3 +195,16 @@ trip_surfel_shape trip_surfel_shape_of(const trip_neighbours *n, const double to
     s.normal[2] = normal.z;
     return s;
 }
+
+double trip_surfel_density(const trip_neighbours *n)
+{
+    return n->count ? n->count / (M_PI * n->nearest[n->count - 1].distance2) : 1;
+}
+
+double trip_surfel_spread(const trip_neighbours *n)
+{
+    double sum = 0;
+    for (unsigned i = 0; i < n->count; i++)
+        sum += sqrt(n->nearest[i].distance2);
+    return n->count ? sum / n->count : 0;
+}

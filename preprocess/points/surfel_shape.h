@@ -8,7 +8,9 @@
  *
  * Normal: the direction in which the neighbours and the point vary least. Where neighbours lie on a
  * line, the direction across it that is nearest to `towards`. A normal points to the side of
- * `towards`. */
+ * `towards`.
+ *
+ * Density: k / (pi R^2) points per unit of area. */
 #ifndef TRIP_SURFEL_SHAPE_H
 #define TRIP_SURFEL_SHAPE_H
 
@@ -23,5 +25,9 @@ typedef struct trip_surfel_shape {
 
 /* `towards` need not have unit length. Without neighbours, it is the normal's direction. */
 trip_surfel_shape trip_surfel_shape_of(const trip_neighbours *n, const double towards[3]);
+/* Returns the density of points; 1 without neighbours. */
+double trip_surfel_density(const trip_neighbours *n);
+/* Returns the mean distance of the neighbours; 0 without any. */
+double trip_surfel_spread(const trip_neighbours *n);
 
 #endif

@@ -18,6 +18,7 @@ SIZES = ["", "0", "-5", "x", "5Q", "5MM", "nan", "99999999999999999999999G", "M"
 BRICK = {
     "--color": NAMES + ["red", "RGB"],
     "--k": COUNTS + ["2", "65"],
+    "--outliers": NUMBERS + ["0", "-1", "1001"],
     "--radius": ["", "0", "-1", "x", "1y", "xx", "nan", "inf", "1e13", "1e7x", "0x"],
     "--allow-gaps": None,
     "--series": COUNTS,
@@ -58,6 +59,7 @@ BRICK = {
 RENDER = {
     "--color": NAMES + ["red", "RGB"],
     "--k": COUNTS + ["2", "65"],
+    "--outliers": NUMBERS + ["0", "-1", "1001"],
     "--radius": ["", "0", "-1", "x", "1y", "xx", "nan", "inf", "1e13", "1e7x", "0x"],
     "--axes": NAMES + ["PI", "PIRS", "pir", "PAR"],
     "--channel": ["", "-1", "1.5", "x", "9" * 20],

@@ -176,7 +176,68 @@ class Points(program.ProgramTest):
         self.fails(1, "brick", "many.ply", "-o", "small.trip", "--memory", "2M", says="raise --memory")
         self.assertFalse(glob.glob("small.trip*"))
 
+    def test_results_of_all_points_do_not_depend_on_memory_and_threads(self):
+        r = numpy.random.default_rng(3)
+        write_cloud("some.ply", r.normal(0, 1, (30000, 3)) * [9, 4, 1])
+        made = []
+        for i, options in enumerate((("--threads", 1), ("--threads", 3, "--memory", "14M"))):
+            self.works("brick", "some.ply", "-o", f"s{i}.trip", "-q", "--outliers", 1, "--color", "density",
+                       *options)
+            made.append([pathlib.Path(path).read_bytes() for path in sorted(glob.glob(f"s{i}.trip/*"))])
+        self.assertEqual(*made)
+
+    # ---- outliers ----
+
+    def test_outliers_are_those_of_a_computation_by_numpy(self):
+        """Strays lie around a square. Pictures show the other points alone."""
+        r = numpy.random.default_rng(5)
+        points = numpy.concatenate([r.uniform(-.5, .5, (500, 3)), r.uniform(-1, 1, (40, 3))]) * [1, 1, 0]
+        apart = numpy.linalg.norm(points[:, None] - points[None], axis=2)
+        spread = numpy.sort(apart, axis=1)[:, 1:9].mean(axis=1)
+        shape = {"radius": [.03] * 540, "nx": [0] * 540, "ny": [0] * 540, "nz": [1] * 540}
+        write_cloud("strays.ply", points, red=[255] * 540, green=r.integers(0, 255, 540), blue=[0] * 540, **shape)
+        rows = numpy.arange(540)
+        for deviations in 0.5, 1, 3:
+            kept = spread <= spread.mean() + deviations * spread.std(ddof=1)
+            self.assertTrue(0 < (~kept).sum() < 60)
+            shutil.rmtree("kept.trip", ignore_errors=True)
+            run = self.works("brick", "strays.ply", "-o", "kept.trip", "--json", "--k", 8, "--outliers", deviations)
+            done = json.loads(run.stdout)
+            self.assertEqual((done["gaussians"], done["outliers"]), (kept.sum(), (~kept).sum()))
+            self.assertIn(f"{(~kept).sum()} of 540 points are outliers", run.stderr)
+            self.assert_shows("kept.trip", points[rows[kept]])
+        self.assertNotIn("outliers", self.works("brick", "strays.ply", "-o", "all.trip").stderr)
+
+    def assert_shows(self, data, points):
+        """Only pixels near the points are covered, and every pixel at a point is."""
+        seen = self.front(data)[:, :, 3] > 0.01
+        x, y = (32.5 * (1 + points[:, 0])).astype(int), (32.5 * (1 - points[:, 1])).astype(int)
+        near = numpy.zeros((75, 75), bool)
+        for dx in range(-4, 5):
+            for dy in range(-4, 5):
+                near[numpy.clip(y + dy, 0, 74), numpy.clip(x + dx, 0, 74)] = True
+        self.assertFalse((seen & ~near[:65, :65]).any())
+        inside = (x >= 0) & (x < 65) & (y >= 0) & (y < 65)
+        self.assertTrue(seen[y[inside], x[inside]].all())
+
+    def test_few_points_have_no_outliers(self):
+        for points in [[0, 0, 0]], [[0, 0, 0]] * 9, [[0, 0, 0], [1, 0, 0]]:
+            write_cloud("few.ply", points)
+            picture = self.front("few.ply", "--outliers", "1e-3", "--color", "density")
+            self.assertGreater(picture[:, :, 3].max(), 0.9)
+
     # ---- colours ----
+
+    def test_density_is_coloured_by_its_logarithm(self):
+        """Each point has four neighbours at most `apart` away, one of them exactly so. Density is
+        four times as high in each cluster as in the one before."""
+        points = []
+        for x, apart in (-.6, .08), (0, .04), (.6, .02):
+            side, back = .45 * apart, -apart * math.sqrt(1 - .45 ** 2)
+            points += [[x, 0, 0], *([x + side * a, side * b, back] for a, b in ((1, 0), (0, 1), (-1, 0), (0, -1)))]
+        write_cloud("dense.ply", points)
+        viridis = numpy.array([[68, 1, 84], [33, 145, 140], [253, 231, 37]]) / 255
+        numpy.testing.assert_allclose(self.middle("dense.ply", "--color", "density", "--k", 4), viridis, atol=0.02)
 
     def test_points_have_their_own_colours(self):
         write_cloud("rgb.ply", [[0, 0, 0]], red=[255], green=[128], blue=[0])
@@ -313,7 +374,7 @@ class Points(program.ProgramTest):
         scene = os.path.join(program.DATASETS, "train-1000.ply")
         write_cloud("a.ply", grid(4))
         self.works("brick", "a.ply", "-o", "a.trip", "-q")
-        for options in ("--color", "height"), ("--k", 8), ("--radius", 1), ("--radius", "2x"):
+        for options in ("--color", "height"), ("--k", 8), ("--radius", 1), ("--radius", "2x"), ("--outliers", 2):
             for name in "v.nrrd", scene:
                 self.leaves_nothing(2, "brick", name, "-o", "no.trip", *options)
                 self.leaves_nothing(2, "render", name, "-o", "no.png", *options)
@@ -324,6 +385,7 @@ class Points(program.ProgramTest):
         for options in (("--spacing", "1,1,1"), ("--grid", "x"), ("--fill", "0"), ("--levels", "2"),
                         ("--normals", "full"), ("--keep-all",), ("--dry-run",), ("--k", 2), ("--k", 65),
                         ("--radius", 0), ("--radius", "-1"), ("--radius", "x"), ("--radius", "nan"),
+                        ("--outliers", 0), ("--outliers", "1001"),
                         ("--color", "blue"), ("--color", "rgb"), ("--color", "intensity"),
                         ("--color", "classification"), ("--color", "return"), ("--color", "time"),
                         ("--axes", "SAR"), ("--axes", "xyz")):
