@@ -180,7 +180,7 @@ class Points(program.ProgramTest):
         r = numpy.random.default_rng(3)
         write_cloud("some.ply", r.normal(0, 1, (30000, 3)) * [9, 4, 1])
         made = []
-        for i, options in enumerate((("--threads", 1), ("--threads", 3, "--memory", "14M"))):
+        for i, options in enumerate((("--threads", 1), ("--threads", 3, "--memory", "24M"))):
             self.works("brick", "some.ply", "-o", f"s{i}.trip", "-q", "--outliers", 1, "--color", "density",
                        *options)
             made.append([pathlib.Path(path).read_bytes() for path in sorted(glob.glob(f"s{i}.trip/*"))])

@@ -31,6 +31,7 @@ typedef struct cloud {
     size_t count;
     trip_budget *budget;
     trip_output spool;
+    trip_octree octree;
     trip_point_tiles *tiles;
     trip_neighbours *found; /* of each row of the tiles */
     unsigned wanted;
@@ -46,6 +47,7 @@ static void make_tiles(cloud *c, uint64_t memory)
                                                                .unnamed = true },
                                         c->budget),
                      0);
+    double lo[3] = { INFINITY, INFINITY, INFINITY }, hi[3] = { -INFINITY, -INFINITY, -INFINITY };
     trip_gaussian_sample sample = { .points = calloc(c->count, sizeof *sample.points) };
     for (size_t i = 0; i < c->count; i++) {
         trip_point_row row = { .head.number = i };
@@ -53,14 +55,19 @@ static void make_tiles(cloud *c, uint64_t memory)
         assert_int_equal(trip_output_append(&c->spool, &row, sizeof row), 0);
         if (trip_gaussian_is_sampled(i, c->count))
             memcpy(sample.points[sample.count++].centre, c->points[i], sizeof row.position);
+        for (int a = 0; a < 3; a++) {
+            lo[a] = fmin(lo[a], c->points[i][a]);
+            hi[a] = fmax(hi[a], c->points[i][a]);
+        }
     }
+    assert_true(trip_octree_build(&c->octree, &sample, c->count, lo, hi, c->budget));
     assert_int_equal(trip_output_flush(&c->spool), 0);
     trip_workers *workers;
     assert_int_equal(trip_workers_create(&workers, 2), 0);
     const trip_point_tiles_params params = { .spool = &c->spool,
                                              .workers = workers,
                                              .records = c->count,
-                                             .sample = &sample,
+                                             .octree = &c->octree,
                                              .folder = ".",
                                              .name = "cloud" };
     assert_int_equal(trip_point_tiles_make(&c->tiles, &params, c->budget), 0);
@@ -71,6 +78,7 @@ static void make_tiles(cloud *c, uint64_t memory)
 static void release(cloud *c)
 {
     trip_point_tiles_free(c->tiles);
+    trip_octree_free(&c->octree);
     trip_output_close(&c->spool);
     assert_int_equal(trip_budget_left_bytes(c->budget), trip_budget_limit_bytes(c->budget));
     trip_budget_destroy(c->budget);
