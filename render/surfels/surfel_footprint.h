@@ -140,7 +140,7 @@ static inline bool trip_surfel_footprint_of(const trip_camera *c, const trip_gau
     const double by = c->ortho ? 1 : f->z;
     f->x = trip_dot(c->to_x, from_eye) / by;
     f->y = trip_dot(c->to_y, from_eye) / by;
-    if (!trip_surfel_set_ellipse(c, g, deviations, trip_gaussian_opacity(g, s), f))
+    if (!trip_surfel_set_ellipse(c, g, deviations, (double)g->opacity, f))
         return false;
     const int normal = trip_surfel_axis(g);
     trip_surfel_set_plane(c, trip_surfel_principal(g, normal), from_eye,

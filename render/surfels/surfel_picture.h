@@ -49,8 +49,9 @@
  *    The mean of their colours, where an infinite D counts as transparent, comes behind p with the
  *    weight 1 - A(p). If no neighbour lies behind p, p is opaque.
  *
- * The background comes behind all. The depth picture (layer.h) has D(p), and infinity where nothing
- * is drawn.
+ * An opacity_scale below 1 gives the whole cloud the opacity 1 - 0.01^opacity_scale, since surfels
+ * have an opacity of 0.99. The background comes behind all. The depth picture (layer.h) has D(p),
+ * and infinity where nothing is drawn.
  *
  * Surfels behind D + t at all pixels that they may reach change nothing. So renderers may leave out
  * any that are behind the D known so far: no bit of the picture depends on it. */
@@ -75,6 +76,12 @@ enum {
     TRIP_SURFEL_GUARD = 40, /* cells beyond each side of the picture */
     TRIP_SURFEL_FINE = 8,   /* cells as wide as pixels; and cells of an octave further out */
 };
+
+/* Returns the opacity of the whole cloud. */
+static inline double trip_surfel_opacity(const trip_gaussian_settings *s)
+{
+    return s->opacity_scale > 0 && s->opacity_scale < 1 ? 1 - pow(0.01, s->opacity_scale) : 1;
+}
 
 /* Returns the cell of a position along an axis, from -TRIP_SURFEL_GUARD up to
  * size + TRIP_SURFEL_GUARD - 1. */

@@ -49,10 +49,10 @@ struct trip_surfels_cpu {
     size_t batch_max;
     trip_surfel_projected *batch;
     uint32_t *batch_cells; /* NO_CELL: skipped */
+    uint32_t *batch_numbers;
     trip_surfel_getter *get;
     const void *context;
     size_t from, count;
-    uint32_t first;
     uint64_t outside, hidden; /* counted by tasks */
 
     trip_surfels_cpu_stats stats;
@@ -68,7 +68,8 @@ struct trip_surfels_cpu {
     X(s->holders, s->cells * sizeof(trip_surfel_projected))                                        \
     X(s->reaches, (size_t)s->cell_rows * sizeof(row_reach))                                        \
     X(s->batch, s->batch_max * sizeof(trip_surfel_projected))                                      \
-    X(s->batch_cells, s->batch_max * sizeof(uint32_t))
+    X(s->batch_cells, s->batch_max * sizeof(uint32_t))                                             \
+    X(s->batch_numbers, s->batch_max * sizeof(uint32_t))
 
 static void release_buffers(trip_surfels_cpu *s)
 {
@@ -228,7 +229,7 @@ static void project(trip_surfels_cpu *s, size_t i, skipped *skip)
     trip_gaussian g;
     trip_surfel_projected *p = &s->batch[i];
     s->batch_cells[i] = NO_CELL;
-    s->get(s->context, s->from + i, &g);
+    s->batch_numbers[i] = s->get(s->context, s->from + i, &g);
     if (!trip_surfel_footprint_of(&s->camera, &s->settings, &g, &f)) {
         skip->outside++;
         return;
@@ -249,7 +250,7 @@ static void project(trip_surfels_cpu *s, size_t i, skipped *skip)
     const int row = trip_surfel_cell(f.y, s->camera.height) + TRIP_SURFEL_GUARD;
     s->batch_cells[i] = (uint32_t)row * (uint32_t)s->pitch + (uint32_t)column;
     lower_depths(s, p);
-    lower_key(s, s->batch_cells[i], key_of(p, s->first + (uint32_t)(s->from + i)));
+    lower_key(s, s->batch_cells[i], key_of(p, s->batch_numbers[i]));
 }
 
 static void project_some(void *context, unsigned task)
@@ -272,8 +273,7 @@ static void write_some(void *context, unsigned task)
     const size_t end = begin + TASK < s->count ? begin + TASK : s->count;
     for (size_t i = begin; i < end; i++) {
         const uint32_t cell = s->batch_cells[i];
-        if (cell != NO_CELL &&
-            s->keys[cell] == key_of(&s->batch[i], s->first + (uint32_t)(s->from + i)))
+        if (cell != NO_CELL && s->keys[cell] == key_of(&s->batch[i], s->batch_numbers[i]))
             s->holders[cell] = s->batch[i];
     }
 }
@@ -284,12 +284,11 @@ static unsigned tasks_for(size_t count, size_t per_task)
 }
 
 int trip_surfels_cpu_add_from(trip_surfels_cpu *s, trip_surfel_getter *get, const void *context,
-                              size_t count, uint32_t first)
+                              size_t count)
 {
     const uint64_t began = trip_now_ns();
     s->get = get;
     s->context = context;
-    s->first = first;
     for (s->from = 0; s->from < count; s->from += s->count) {
         const int status = trip_frame_poll();
         if (status)
@@ -306,15 +305,23 @@ int trip_surfels_cpu_add_from(trip_surfels_cpu *s, trip_surfel_getter *get, cons
     return 0;
 }
 
-static void get_from_array(const void *surfels, size_t i, trip_gaussian *out)
+typedef struct array {
+    const trip_gaussian *surfels;
+    uint32_t first;
+} array;
+
+static uint32_t get_from_array(const void *context, size_t i, trip_gaussian *out)
 {
-    *out = ((const trip_gaussian *)surfels)[i];
+    const array *from = context;
+    *out = from->surfels[i];
+    return from->first + (uint32_t)i;
 }
 
 int trip_surfels_cpu_add(trip_surfels_cpu *s, const trip_gaussian *surfels, size_t count,
                          uint32_t first)
 {
-    return trip_surfels_cpu_add_from(s, get_from_array, surfels, count, first);
+    const array from = { surfels, first };
+    return trip_surfels_cpu_add_from(s, get_from_array, &from, count);
 }
 
 /* ---- blending ---- */
@@ -506,6 +513,9 @@ static void write_pixel(const picture *p, int x, int y)
     }
     if (own && s->sums[at].coverage < 1)
         put_neighbours_behind(s, at, near, depth_at(s, at) + own->tolerance, rgba);
+    const float opacity = (float)trip_surfel_opacity(&s->settings);
+    for (int k = 0; k < 4; k++)
+        rgba[k] *= opacity;
     const float rest = (1 - rgba[3]) * (float)behind[3];
     for (int k = 0; k < 3; k++)
         p->rgba[4 * at + (size_t)k] = rgba[k] + rest * (float)behind[k];

@@ -39,15 +39,15 @@ typedef struct trip_surfels_cpu_stats {
 int trip_surfels_cpu_begin(trip_surfels_cpu **out, const trip_surfels_cpu_params *params);
 void trip_surfels_cpu_end(trip_surfels_cpu *s); /* NULL is allowed */
 
-/* Gets surfel `i` of a batch. Any thread. */
-typedef void trip_surfel_getter(const void *context, size_t i, trip_gaussian *out);
+/* Gets surfel `i` of a batch and returns its number. Any thread. */
+typedef uint32_t trip_surfel_getter(const void *context, size_t i, trip_gaussian *out);
 
-/* Adds surfels with the numbers from `first` on. No number may be added twice. Fails if it is
+/* Adds surfels, here with the numbers from `first` on. No number may be added twice. Fails if it is
  * interrupted. */
 int trip_surfels_cpu_add(trip_surfels_cpu *s, const trip_gaussian *surfels, size_t count,
                          uint32_t first);
 int trip_surfels_cpu_add_from(trip_surfels_cpu *s, trip_surfel_getter *get, const void *context,
-                              size_t count, uint32_t first);
+                              size_t count);
 
 /* Returns whether surfels change nothing: they reach up to a rectangle, in pixels, and lie behind
  * `depth`, together with their tolerances. The rectangle may exceed the picture. */

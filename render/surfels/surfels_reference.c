@@ -251,6 +251,8 @@ void trip_surfels_reference_picture(trip_surfels_reference *r, float *rgba, floa
             const size_t at = (size_t)y * (size_t)c->width + (size_t)x;
             double own[4];
             const bool any = finish(r, x, y, own);
+            for (int k = 0; k < 4; k++)
+                own[k] *= trip_surfel_opacity(&r->settings);
             const double rest = (1 - own[3]) * behind[3];
             for (int k = 0; k < 3; k++)
                 rgba[4 * at + (size_t)k] = (float)(own[k] + rest * behind[k]);

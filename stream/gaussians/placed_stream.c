@@ -40,9 +40,8 @@ struct trip_placed_stream {
 
 /* ---- placement ---- */
 
-/* Sets an affine function of the set's space from one of the common space. */
-static void place(const trip_gaussian_transform *t, const double from[3], double offset,
-                  double direction[3], double *placed_offset)
+void trip_place_function(const trip_gaussian_transform *t, const double from[3], double offset,
+                         double direction[3], double *placed_offset)
 {
     if (t->identity) {
         memcpy(direction, from, 3 * sizeof *from);
@@ -56,9 +55,8 @@ static void place(const trip_gaussian_transform *t, const double from[3], double
     }
 }
 
-/* Moves the eye of levels of detail into the set's space. Only parallel views have pixels of a
- * length. */
-static void place_lod(trip_gaussian_lod *lod, const trip_gaussian_transform *t)
+/* Only parallel views have pixels of a length. */
+void trip_place_lod(trip_gaussian_lod *lod, const trip_gaussian_transform *t)
 {
     double from[3], eye[3] = { 0 };
     if (t->identity)
@@ -71,6 +69,15 @@ static void place_lod(trip_gaussian_lod *lod, const trip_gaussian_transform *t)
     memcpy(lod->eye, eye, sizeof eye);
     if (lod->parallel)
         lod->px *= t->scale;
+}
+
+int trip_place_axis(const trip_gaussian_transform *t, int axis)
+{
+    const double *row = t->m[axis];
+    for (int a = 0; a < 3; a++)
+        if (fabs(row[a]) > fabs(row[axis]) * (1 + 1e-9))
+            axis = a;
+    return axis;
 }
 
 /* Asks about a box that holds the placed box. */
@@ -104,21 +111,19 @@ static void place_params(part *p, const trip_gaussian_transform *t,
                          const trip_gaussian_stream_params *from)
 {
     p->params = *from;
-    place(t, from->key.direction, from->key.offset, p->params.key.direction, &p->params.key.offset);
+    trip_place_function(t, from->key.direction, from->key.offset, p->params.key.direction,
+                        &p->params.key.offset);
     for (unsigned i = 0; i < from->plane_count; i++) {
         const trip_gaussian_plane *plane = &from->planes[i];
-        place(t, plane->normal, plane->offset, p->planes[i].normal, &p->planes[i].offset);
+        trip_place_function(t, plane->normal, plane->offset, p->planes[i].normal,
+                            &p->planes[i].offset);
         p->planes[i].reach = t->identity ? plane->reach : plane->reach * t->scale;
     }
     p->params.planes = p->planes;
     p->placement = t;
     p->need = from->need;
-    place_lod(&p->params.lod, t);
-    /* The list whose order is nearest to the order along the common axis. */
-    const double *row = t->m[from->axis];
-    for (int a = 0; a < 3; a++)
-        if (fabs(row[a]) > fabs(row[p->params.axis]) * (1 + 1e-9))
-            p->params.axis = a;
+    trip_place_lod(&p->params.lod, t);
+    p->params.axis = trip_place_axis(t, from->axis);
 }
 
 /* Sets the bounds of a part's keys from the box of the set's centres. */

@@ -16,6 +16,15 @@ typedef struct trip_placed_set {
     trip_gaussian_transform placement; /* a similarity (`even`) */
 } trip_placed_set;
 
+/* Sets an affine function of the set's space from one of the common space:
+ * direction * position + offset. */
+void trip_place_function(const trip_gaussian_transform *t, const double from[3], double offset,
+                         double direction[3], double *placed_offset);
+/* Moves the eye of levels of detail from the common space into the set's space. */
+void trip_place_lod(trip_gaussian_lod *lod, const trip_gaussian_transform *t);
+/* Returns the axis of the set's space that is nearest to an axis of the common space. */
+int trip_place_axis(const trip_gaussian_transform *t, int axis);
+
 typedef struct trip_placed_stream trip_placed_stream;
 
 /* Fails before it reads anything if the budget is too small for the sets that are open together.

@@ -41,6 +41,7 @@ struct trip_gaussian_frame {
     /* Draw the frame if they are not NULL. */
     trip_gaussian_integral *integral;
     trip_gaussian_sheet_frame *sheets;
+    trip_surfel_frame *surfels;
     trip_settings weights; /* of the order by lists */
     int axis_of_view;
     layer layers[LAYERS_MAX];
@@ -334,6 +335,42 @@ static trip_gaussian_frame_stats stats_of_sheets(const trip_gaussian_frame *f)
     };
 }
 
+/* ---- deferred ---- */
+
+static int begin_surfels(trip_gaussian_frame *f)
+{
+    const trip_gaussian_frame_params *p = &f->params;
+    return trip_surfel_frame_begin(&f->surfels,
+                                   &(trip_surfel_frame_params){ .sets = p->sets,
+                                                                .set_count = p->set_count,
+                                                                .drawn = p->drawn,
+                                                                .camera = p->camera,
+                                                                .settings = p->settings,
+                                                                .lod_px = p->lod_px,
+                                                                .reference = p->reference,
+                                                                .history = p->history,
+                                                                .budget = p->budget,
+                                                                .runner = p->runner });
+}
+
+static trip_gaussian_frame_stats stats_of_surfels(const trip_gaussian_frame *f)
+{
+    const trip_surfel_frame_stats s = trip_surfel_frame_get_stats(f->surfels);
+    return (trip_gaussian_frame_stats){
+        .gaussians = s.read,
+        .planned = s.planned,
+        .coarse = s.coarse,
+        .bricks = s.bricks,
+        .bytes_read = s.bytes_read,
+        .surfels = s,
+        .layers = 1,
+        .done = s.done,
+        .draw_ms = s.draw_ms,
+        .read_ms = s.read_ms,
+        .merge_ms = s.blend_ms,
+    };
+}
+
 /* ---- the frame ---- */
 
 /* The weights of the lists need no Gaussians. */
@@ -383,6 +420,7 @@ int trip_gaussian_frame_begin(trip_gaussian_frame **out, const trip_gaussian_fra
         f->weights = *params->by_lists;
     const int status = shows_weights(f)    ? 0
                        : params->integral  ? begin_integral(f)
+                       : params->deferred  ? begin_surfels(f)
                        : params->sheet > 0 ? begin_sheets(f)
                                            : begin_layers_and_streams(f);
     if (!status)
@@ -453,6 +491,8 @@ int trip_gaussian_frame_step_to(trip_gaussian_frame *f, double depth, uint64_t d
         return trip_gaussian_integral_step(f->integral, deadline_ns);
     if (f->sheets)
         return trip_gaussian_sheet_frame_step(f->sheets, deadline_ns);
+    if (f->surfels)
+        return trip_surfel_frame_step(f->surfels, deadline_ns);
     f->stop = depth;
     f->paused = false;
     while (!status && f->drawn < f->layer_count && !f->paused) {
@@ -522,6 +562,8 @@ int trip_gaussian_frame_picture(trip_gaussian_frame *f, float *rgba, float *dept
         trip_gaussian_integral_picture(f->integral, rgba);
     else if (f->sheets)
         trip_gaussian_sheet_frame_picture(f->sheets, rgba, depth);
+    else if (f->surfels)
+        trip_surfel_frame_picture(f->surfels, rgba, depth);
     else
         status = f->params.by_lists ? merge(f, rgba, depth) : take_layer(f->layers, rgba, depth);
     f->stats.merge_ms += trip_now_ms() - begun;
@@ -534,6 +576,8 @@ trip_gaussian_frame_stats trip_gaussian_frame_get_stats(const trip_gaussian_fram
         return stats_of_integral(f);
     if (f->sheets)
         return stats_of_sheets(f);
+    if (f->surfels)
+        return stats_of_surfels(f);
     trip_gaussian_frame_stats stats = f->stats;
     const trip_gaussian_progress read = read_by(f);
     stats.bricks = read.bricks;
@@ -548,6 +592,7 @@ void trip_gaussian_frame_end(trip_gaussian_frame *f)
     trip_budget *budget = f->params.budget;
     trip_gaussian_integral_end(f->integral);
     trip_gaussian_sheet_frame_end(f->sheets);
+    trip_surfel_frame_end(f->surfels);
     close_streams(f);
     for (unsigned i = 0; i < f->layer_count; i++) {
         trip_gaussians_cpu_end(f->layers[i].cpu);

@@ -1,5 +1,5 @@
-/* Draws one picture of placed Gaussian scenes, in steps: streams their Gaussians in the order of
- * drawing, composites them into layers, and merges the layers.
+/* Draws one picture of placed Gaussian scenes or clouds of points, in steps: streams their
+ * Gaussians in the order of drawing, composites them into layers, and merges the layers.
  *
  * - The order by depth has one layer. Its Gaussians come in the order of the centres' view depth.
  * - The order by lists has a layer for each axis with weight in the picture. Its Gaussians come in
@@ -7,6 +7,7 @@
  *   w^2 (equation 3 of Hofsetz, Max & Bastos 2008; weight.h).
  * - The order by sheets lets Gaussians overlap (gaussian_sheets.h).
  * - The integral has neither order nor layers (gaussian_integral.h).
+ * - The deferred picture is for clouds, and has neither (surfel_frame.h).
  *
  * A layer ends early once no pixel takes more. One thread; the runner lends others. */
 #ifndef TRIP_GAUSSIAN_FRAME_H
@@ -16,6 +17,7 @@
 #include "gaussian_tiles.h"
 #include "placed_stream.h"
 #include "settings.h"
+#include "surfel_frame.h"
 #include "task_runner.h"
 
 typedef struct trip_gaussian_frame trip_gaussian_frame;
@@ -33,9 +35,11 @@ typedef struct trip_gaussian_frame_params {
     /* Width in pixels of the voxels that coarse Gaussians may stand for; 0: none do. Sheets and the
      * integral have none. */
     double lod_px;
-    bool reference;   /* draws in double precision, without threads */
-    bool integral;    /* has no order */
-    double tolerance; /* of the integral; 0 means the default */
+    bool reference;               /* draws in double precision, without threads */
+    bool integral;                /* has no order */
+    bool deferred;                /* has none either */
+    trip_surfel_history *history; /* of deferred pictures, see trip_surfel_frame_params */
+    double tolerance;             /* of the integral; 0 means the default */
     /* Composites in place of the CPU; NULL for none. It must outlive the frame. */
     const trip_tile_device *device;
     trip_budget *budget;
@@ -47,6 +51,7 @@ typedef struct trip_gaussian_frame_stats {
     uint64_t planned;   /* in the plans of the streams */
     uint64_t coarse;    /* in the plans, of coarse levels */
     uint64_t bricks, bytes_read;
+    trip_surfel_frame_stats surfels; /* of a deferred picture */
     uint64_t window_records; /* room in the largest window, or Gaussians that meet a sheet */
     unsigned layers;
     double done; /* share of the frame, 0 to 1 */
