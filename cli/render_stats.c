@@ -182,6 +182,19 @@ static void add_objects(cJSON *frame, triptych *t)
         cJSON_AddItemToArray(list, cJSON_CreateNumber((double)drawn[i]));
 }
 
+/* Adds the surfels of a deferred picture, by their fate. */
+static void add_surfels(cJSON *frame, const triptych_frame_stats *s)
+{
+    cJSON *o = cJSON_AddObjectToObject(frame, "surfels");
+    cJSON_AddNumberToObject(o, "objects_in_view", s->objects_in_view);
+    cJSON_AddNumberToObject(o, "planned", (double)s->surfels_planned);
+    cJSON_AddNumberToObject(o, "unread", (double)s->surfels_unread);
+    cJSON_AddNumberToObject(o, "read", (double)s->splats);
+    cJSON_AddNumberToObject(o, "outside", (double)s->surfels_outside);
+    cJSON_AddNumberToObject(o, "hidden", (double)s->surfels_hidden);
+    cJSON_AddNumberToObject(o, "visible", (double)s->surfels_visible);
+}
+
 int render_stats_add_frame(render_stats *s, triptych *t)
 {
     triptych_frame_stats frame;
@@ -207,6 +220,8 @@ int render_stats_add_frame(render_stats *s, triptych *t)
         cJSON_AddNumberToObject(f, "bytes_read", (double)frame.bytes_read);
         add_objects(f, t);
     }
+    if (frame.order == TRIPTYCH_ORDER_DEFERRED)
+        add_surfels(f, &frame);
     cJSON *lists = cJSON_AddObjectToObject(f, "lists");
     if (!f || !lists || !cJSON_AddItemToArray(s->frames, f)) {
         cJSON_Delete(f);
@@ -263,14 +278,14 @@ static void add_interpolation(cJSON *root, triptych_interpolation drawn)
 static void add_scene_method(cJSON *root, const render_options *o,
                              const triptych_frame_stats *frame)
 {
-    const draw_settings by_depth = { .scene.order = TRIPTYCH_ORDER_DEPTH };
-    const draw_settings *s = o->settings.scene.order ? &o->settings : &by_depth;
+    const draw_settings drawn = { .scene.order = frame->order };
     cJSON_AddStringToObject(root, "order",
                             o->resources.renderer == TRIPTYCH_RENDERER_INTEGRAL
                                 ? "integral"
-                                : draw_settings_choice(s, DRAW_ORDER));
+                                : draw_settings_choice(&drawn, DRAW_ORDER));
     cJSON_AddStringToObject(root, "kernel",
-                            frame->footprint
+                            frame->order == TRIPTYCH_ORDER_DEFERRED ? "discs"
+                            : frame->footprint
                                 ? footprint_names[frame->footprint - TRIPTYCH_FOOTPRINT_EXACT]
                                 : "projected");
 }
@@ -411,6 +426,8 @@ static void explain_list(void *user, const char *name, const triptych_list_stats
                 trip_format_bytes(s->bytes_read, bytes), s->splats_read, c->things);
 }
 
+enum { OBJECTS_PRINTED = 16 };
+
 int render_stats_explain_cost(const render_options *o, triptych *t, FILE *out)
 {
     char bytes[32], memory[32];
@@ -423,9 +440,17 @@ int render_stats_explain_cost(const render_options *o, triptych *t, FILE *out)
         return status;
     const uint64_t *drawn;
     const unsigned objects = triptych_get_objects(t, &drawn);
-    for (unsigned i = 0; i < objects && objects > 1; i++)
+    for (unsigned i = 0; i < objects && i < OBJECTS_PRINTED && objects > 1; i++)
         fprintf(out, "object %-4u %" PRIu64 " Gaussians read in the order of drawing\n", i + 1,
                 drawn[i]);
+    if (objects > OBJECTS_PRINTED)
+        fprintf(out, "objects     %u more, which --stats lists\n", objects - OBJECTS_PRINTED);
+    if (frame.order == TRIPTYCH_ORDER_DEFERRED)
+        fprintf(out,
+                "surfels     %" PRIu64 " in view, %" PRIu64 " in hidden bricks not read, %" PRIu64
+                " outside, %" PRIu64 " hidden, %" PRIu64 " visible\n",
+                frame.surfels_planned, frame.surfels_unread, frame.surfels_outside,
+                frame.surfels_hidden, frame.surfels_visible);
     if (frame.bytes_cached)
         fprintf(out, "cache       %s from memory\n", trip_format_bytes(frame.bytes_cached, bytes));
     if (frame.bytes_occluded)

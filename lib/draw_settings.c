@@ -288,7 +288,7 @@ static const char *const primitives[] = { "sprites", "triangles", NULL };
 static const char *const targets[] = { "rgba32f", "rgba16f", "rgba8", NULL };
 static const char *const traversals[] = { "outward", "ascending", NULL };
 static const char *const weights[] = { "pixel", "vertex", NULL };
-static const char *const orders[] = { "depth", "lists", "sheets", NULL };
+static const char *const orders[] = { "depth", "lists", "sheets", "deferred", NULL };
 static const char *const degrees[] = { "0", "1", "2", "3", NULL };
 
 #define CHOICE(names) .type = TRIP_OPTION_CHOICE, .choices = (names), .first = 1
@@ -499,7 +499,8 @@ static const trip_option rows[DRAW_OPTIONS] = {
                        AT(splat.weights), CHOICE(weights) },
     [DRAW_ORDER] = { "order", "NAME",
                      "Selects the order of the Gaussians of a scene: depth (of their centres), "
-                     "lists, or sheets, in which they overlap",
+                     "lists, or sheets, in which they overlap; or deferred, the default of "
+                     "clouds of points: only the nearest surfels are drawn",
                      "depth", "Gaussian scenes only", .group = DRAW_GROUP_ACCURACY,
                      .measured = true, AT(scene.order), CHOICE(orders) },
     [DRAW_SHEET] = { "sheet", "LENGTH",

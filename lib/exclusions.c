@@ -1,4 +1,5 @@
 /* The rules of which settings exclude one another, with their reasons. */
+#include <limits.h>
 #include <math.h>
 #include <stdio.h>
 
@@ -42,6 +43,7 @@ enum {
     UNFILTERED = 1 << 28,
     BY_SHEETS = 1 << 29,
     MAY_EDL = 1 << 30,
+    DEFERRED = INT_MIN, /* bit 31 */
 };
 
 static const uint64_t of_splats =
@@ -97,6 +99,10 @@ static const struct rule {
       "does not apply to --renderer integral, which has no order", IDLE },
     { ROW(ORDER), RENDERER(GL), BY_SHEETS, 0, "sheets requires --renderer cpu or reference",
       CONFLICT },
+    { ROW(ORDER), RENDERER(GL), DEFERRED, 0, "deferred requires --renderer cpu or reference",
+      CONFLICT },
+    { ROW(FOOTPRINT) | ROW(EARLY_TERMINATION), ALL, DEFERRED, 0,
+      "does not apply to --order deferred, which blends at each pixel what is nearest", CONFLICT },
     { ROW(SHEET), ALL, 0, BY_SHEETS, "requires --order sheets", IDLE },
     { ROW(LOD), ALL, BY_SHEETS, 0, "does not apply to --order sheets, which draws the finest level",
       IDLE },
@@ -228,6 +234,7 @@ static int facts_of(const draw_settings *s)
            (s->all.show > TRIPTYCH_SHOW_PICTURE ? DEBUG_VIEW : 0) |
            (s->all.show == TRIPTYCH_SHOW_MERGE ? SHOW_MERGE : 0) |
            (s->scene.order == TRIPTYCH_ORDER_SHEETS ? BY_SHEETS : 0) |
+           (s->scene.order == TRIPTYCH_ORDER_DEFERRED ? DEFERRED : 0) |
            (s->all.count_exactly ? COUNTED : 0) | (s->all.samples > 1 ? SEVERAL_SAMPLES : 0) |
            facts_of_splats(s) | facts_of_effects(s);
 }
@@ -346,7 +353,7 @@ static const uint64_t not_of_objects = ROW(SHEET) | ROW(LOD) | ROW(MAX_BYTES) | 
 
 /* These kinds do not have these choices, for these reasons. */
 static const struct choice {
-    draw_kind kind;  /* scenes stand for clouds too */
+    draw_kind kind;  /* scenes stand for clouds too, but clouds have all orders */
     int row, choice; /* index in trip_option.choices */
     const char *why;
 } missing[] = {
@@ -356,14 +363,17 @@ static const struct choice {
       "image does not apply to Gaussian scenes" },
     { DRAW_KIND_SCENE, DRAW_SHOW, TRIPTYCH_SHOW_LEVELS - TRIPTYCH_SHOW_PICTURE,
       "levels does not apply to Gaussian scenes" },
+    { DRAW_KIND_SCENE, DRAW_ORDER, TRIPTYCH_ORDER_DEFERRED - 1,
+      "deferred requires clouds of points alone" },
+    { DRAW_KIND_OBJECTS, DRAW_ORDER, TRIPTYCH_ORDER_DEFERRED - 1, "deferred " NOT_OF_OBJECTS },
     { DRAW_KIND_OBJECTS, DRAW_ORDER, TRIPTYCH_ORDER_LISTS - 1, "lists " NOT_OF_OBJECTS },
     { DRAW_KIND_OBJECTS, DRAW_ORDER, TRIPTYCH_ORDER_SHEETS - 1, "sheets " NOT_OF_OBJECTS },
 };
 
-/* The order by depth has one layer, so nothing is merged. */
+/* The order by depth has one layer, so nothing is merged. Deferred pictures have one, too. */
 static bool has_one_layer(const draw_settings *s)
 {
-    return s->scene.order <= TRIPTYCH_ORDER_DEPTH;
+    return s->scene.order <= TRIPTYCH_ORDER_DEPTH || s->scene.order == TRIPTYCH_ORDER_DEFERRED;
 }
 
 static uint64_t rows_of_kind(const draw_settings *s, int kind)
@@ -389,7 +399,8 @@ bool draw_settings_applies(const draw_settings *s, int row, int kind)
 
 static bool concerns(const struct choice *c, int kind)
 {
-    return (int)c->kind == (kind == DRAW_KIND_CLOUD ? DRAW_KIND_SCENE : kind);
+    return kind == DRAW_KIND_CLOUD ? c->kind == DRAW_KIND_SCENE && c->row != DRAW_ORDER
+                                   : (int)c->kind == kind;
 }
 
 bool draw_settings_choice_applies(int row, int choice, int kind)
@@ -435,8 +446,10 @@ int draw_settings_check_kind(const draw_settings *s, const triptych_resources *r
     };
     static const char *const wrong_effects[] = {
         [DRAW_KIND_VOLUME] = "edl applies to Gaussian scenes and clouds of points only",
-        [DRAW_KIND_SCENE] = "must be edl or none for Gaussian scenes",
-        [DRAW_KIND_CLOUD] = "must be edl, auto or none for clouds of points",
+        [DRAW_KIND_SCENE] =
+            "must be edl or none for Gaussian scenes; clouds of points have auto too",
+        [DRAW_KIND_CLOUD] =
+            "must be edl or none for Gaussian scenes; clouds of points have auto too",
         [DRAW_KIND_OBJECTS] = "edl " NOT_OF_OBJECTS,
     };
     const bool objects = kind == DRAW_KIND_OBJECTS;
@@ -444,7 +457,8 @@ int draw_settings_check_kind(const draw_settings *s, const triptych_resources *r
     const struct choice *choice = find_missing(s, kind);
     const struct rule of_layers = {
         .given = ~rows_of_kind(s, kind),
-        .why = "does not apply to scenes with --order depth, which have nothing to merge",
+        .why =
+            "does not apply to scenes with --order depth or deferred, which have nothing to merge",
     };
     if (of_kinds[kind].given & given)
         return fail_rule(&of_kinds[kind], given);

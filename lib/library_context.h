@@ -19,6 +19,7 @@
 #include "quality_choice.h"
 #include "sheet_samples.h"
 #include "source.h"
+#include "surfel_plan.h"
 #include "triptych.h"
 
 enum { TRIP_CONTEXT_MAX_THREADS = 256, TRIP_CONTEXT_NOTES = 8 };
@@ -58,8 +59,9 @@ struct triptych {
     /* For eye-dome lighting: a number for each pixel of the frame, from the budget. NULL: off. */
     float *levels;
     size_t levels_bytes;
-    double scene_opacity; /* factor of the optical depth; 0 means 1 */
-    double begun_ms;      /* when scene_frame was begun */
+    double scene_opacity;               /* factor of the optical depth; 0 means 1 */
+    double begun_ms;                    /* when scene_frame was begun */
+    trip_surfel_history surfel_history; /* of the last deferred picture */
     bool open, has_function;
     trip_context_picture *pictures;
     trip_field *source;      /* values of the volume itself; NULL: the data set's values */

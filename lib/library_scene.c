@@ -77,6 +77,7 @@ static bool is_shared(const triptych *t, unsigned i)
 void trip_context_close_scene(triptych *t)
 {
     trip_context_end_scene(t);
+    trip_surfel_history_drop(&t->surfel_history, t->session.budget);
     for (unsigned i = t->placed_count; i > 0; i--)
         if (t->placed[i - 1].set && !is_shared(t, i - 1))
             trip_gaussian_set_close(t->placed[i - 1].set);
@@ -267,9 +268,37 @@ trip_view_object trip_context_scene_object(const triptych *t)
 /* Gaussians wider than a pixel are drawn as they are. */
 #define DEFAULT_LOD_PX 1.0
 
+/* Returns whether settings are given that only blending has. */
+static bool blends(const triptych *t)
+{
+    return t->given.splat.footprint || t->given.all.early_termination != 0 ||
+           (t->scene_opacity > 0 && t->scene_opacity != 1);
+}
+
+/* Returns whether all objects are surfels, not ellipsoids. */
+static bool is_flat(const triptych *t)
+{
+    bool flat = true;
+    for (unsigned i = 0; i < t->placed_count; i++)
+        flat &= (t->placed[i].set->header.flags & TRIP_GAUSSIAN_FLAT) != 0;
+    return flat;
+}
+
+/* Returns the order that is drawn. */
+static triptych_order order_of(const triptych *t)
+{
+    const triptych_renderer r = t->resources.renderer;
+    const bool defers = kind_of(t) == DRAW_KIND_CLOUD && is_flat(t) && r != TRIPTYCH_RENDERER_GL &&
+                        r != TRIPTYCH_RENDERER_INTEGRAL && !blends(t);
+    return t->given.scene.order ? t->given.scene.order
+           : defers             ? TRIPTYCH_ORDER_DEFERRED
+                                : TRIPTYCH_ORDER_DEPTH;
+}
+
 static bool has_lists(const triptych *t)
 {
-    return t->given.scene.order >= TRIPTYCH_ORDER_LISTS;
+    const triptych_order order = order_of(t);
+    return order == TRIPTYCH_ORDER_LISTS || order == TRIPTYCH_ORDER_SHEETS;
 }
 
 /* Returns half the diagonal of the typical bounds, or of one Gaussian. */
@@ -315,6 +344,8 @@ static int check(const triptych *t)
     if (!t->mixed && r == TRIPTYCH_RENDERER_INTEGRAL && draw_settings_check(&t->given, &r, false))
         return TRIP_USAGE;
     const int status = draw_settings_check_kind(&t->given, &t->resources, kind_of(t));
+    if (!status && t->given.scene.order == TRIPTYCH_ORDER_DEFERRED && !is_flat(t))
+        return trip_option_fail("--order", "deferred requires clouds of surfels, not ellipsoids");
     return status ? status : check_sheets(t);
 }
 
@@ -470,6 +501,8 @@ int trip_context_begin_scene(triptych *t)
         .sheet = sheet_of(t),
         .reference = r == TRIPTYCH_RENDERER_REFERENCE || (integrates && t->mixed),
         .integral = integrates && !t->mixed,
+        .deferred = order_of(t) == TRIPTYCH_ORDER_DEFERRED,
+        .history = &t->surfel_history,
         .tolerance = t->given.integral.tolerance,
         .device = device_of(t),
         .budget = t->session.budget,
@@ -518,13 +551,23 @@ static triptych_frame_stats stats_of(const triptych *t)
         .renderer = renderer_name(r),
         .device = r == TRIPTYCH_RENDERER_REFERENCE ? "CPU, double precision, 1 thread" : t->device,
         .engine = "pread",
-        .ring = "not used: Gaussians come from windows",
+        .ring = order_of(t) == TRIPTYCH_ORDER_DEFERRED
+                    ? "not used: surfels come from bricks, the nearest first"
+                    : "not used: Gaussians come from windows",
         .classify = TRIPTYCH_CLASSIFY_PRE,
         .footprint = t->given.splat.footprint,
-        .early_termination = trip_gaussian_termination(&settings),
+        .early_termination =
+            order_of(t) == TRIPTYCH_ORDER_DEFERRED ? -1 : trip_gaussian_termination(&settings),
         .rays = t->drawn_settings.samples,
         .expected_error = -1,
         .effects = t->levels ? TRIPTYCH_EFFECT_EDL : 0,
+        .order = order_of(t),
+        .surfels_planned = s.surfels.planned,
+        .surfels_unread = s.surfels.unread,
+        .surfels_outside = s.surfels.outside,
+        .surfels_hidden = s.surfels.hidden,
+        .surfels_visible = s.surfels.visible,
+        .objects_in_view = s.surfels.objects,
     };
 }
 
@@ -601,8 +644,16 @@ void trip_context_explain_scene(const triptych *t, FILE *out)
     for (unsigned i = 0; i < t->placed_count; i++) {
         const trip_file_gaussian_header *h = &t->placed[i].set->header;
         const int own = (int)h->degree;
-        fprintf(out, "scene       %llu Gaussians, harmonics up to degree %d of %d\n",
+        unsigned times = 0;
+        if (is_shared(t, i))
+            continue;
+        for (unsigned k = i; k < t->placed_count; k++)
+            times += t->placed[k].set == t->placed[i].set;
+        fprintf(out, "scene       %llu Gaussians, harmonics up to degree %d of %d",
                 (unsigned long long)h->records, own < settings.degree ? own : settings.degree, own);
+        if (times > 1)
+            fprintf(out, ", in %u places", times);
+        fprintf(out, "\n");
     }
     if (t->mixed)
         trip_context_explain_mixed(t, out);
@@ -613,6 +664,10 @@ void trip_context_explain_scene(const triptych *t, FILE *out)
                 "order       by sheets %.4g thick, in %u passes: at most %llu Gaussians meet a "
                 "sheet at a time\n",
                 sheet_of(t), s.layers, (unsigned long long)s.window_records);
+    else if (order_of(t) == TRIPTYCH_ORDER_DEFERRED)
+        fprintf(out,
+                "order       deferred: %llu surfels of %u objects in view, nearest bricks first\n",
+                (unsigned long long)s.planned, s.surfels.objects);
     else if (has_lists(t))
         fprintf(out, "order       by lists: %u of 3 have weight in the picture\n", s.layers);
     else
@@ -623,6 +678,10 @@ void trip_context_explain_scene(const triptych *t, FILE *out)
                 lod_of(t), (unsigned long long)s.coarse, (unsigned long long)s.planned);
     else
         fprintf(out, "levels      the Gaussians of the scene alone\n");
+    if (order_of(t) == TRIPTYCH_ORDER_DEFERRED) {
+        fprintf(out, "footprint   discs, with a filter of 0.48 square pixels (EWA)\n");
+        return;
+    }
     fprintf(out, "footprint   %s%s\n",
             settings.shape == TRIP_GAUSSIAN_EXACT ? "exact, along each pixel's ray"
             : settings.shape == TRIP_GAUSSIAN_EWA ? "EWA, projected at the centre without limits"

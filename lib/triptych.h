@@ -628,8 +628,10 @@ typedef struct triptych_clip {
 
 /* The order in which the Gaussians of a scene are drawn. */
 typedef enum triptych_order {
-    TRIPTYCH_ORDER_DEFAULT, /* depth */
-    TRIPTYCH_ORDER_DEPTH,   /* by the depth of their centres, as scenes are trained */
+    /* Deferred for clouds of points by the CPU or the reference renderer, unless settings for
+     * blending are given: an opacity factor, a footprint, or early termination. Otherwise depth. */
+    TRIPTYCH_ORDER_DEFAULT,
+    TRIPTYCH_ORDER_DEPTH, /* by the depth of their centres, as scenes are trained */
     /* By their coordinates along X, Y and Z. The layers of the three lists are blended. Fewer
      * Gaussians change places when the view turns. */
     TRIPTYCH_ORDER_LISTS,
@@ -637,6 +639,9 @@ typedef enum triptych_order {
      * the sheets that it reaches. The order inside a sheet does not matter. The picture comes close
      * to the integral of overlapping Gaussians. Not with GL. */
     TRIPTYCH_ORDER_SHEETS,
+    /* None: only the nearest surfels of a cloud are drawn, and blended at each pixel. For clouds of
+     * points alone. Not with GL. An opacity factor below 1 makes the whole cloud translucent. */
+    TRIPTYCH_ORDER_DEFERRED,
 } triptych_order;
 
 /* The highest degree of the spherical harmonics of a scene that are read and drawn. */
@@ -847,7 +852,7 @@ typedef struct triptych_frame_stats {
     /* Post, and the integral of values, as drawn; otherwise TRIPTYCH_INTERPOLATION_DEFAULT. */
     triptych_interpolation interpolation;
     triptych_footprint footprint; /* pre, as drawn */
-    /* Transmittance below which pixels took no more samples; -1 with the integral. */
+    /* Transmittance below which pixels took no more samples; -1 with the integral and deferred. */
     double early_termination;
     double tolerance; /* bound of the error of each component of a pixel; 0 without the integral */
     int effects;      /* effects that were drawn */
@@ -868,9 +873,14 @@ typedef struct triptych_frame_stats {
     /* Mean error by the trial, of 255, and the promise of the quality. The error is -1 if no trial
      * was made, and the promise 0 if the quality makes none. */
     double expected_error, promised_error;
-    double trial_ms;  /* of the trial for this frame, not in `ms`; 0 if the choice was known */
-    unsigned trials;  /* made by this context */
-    int choice_waits; /* 1 if the frame has the defaults until triptych_choose() */
+    double trial_ms;      /* of the trial for this frame, not in `ms`; 0 if the choice was known */
+    unsigned trials;      /* made by this context */
+    int choice_waits;     /* 1 if the frame has the defaults until triptych_choose() */
+    triptych_order order; /* of Gaussians, as drawn; TRIPTYCH_ORDER_DEFAULT for volumes */
+    /* Of deferred pictures. The surfels of bricks in view, and of these: in bricks that were not
+     * read since they were hidden; read, but outside the picture; read, but hidden; and visible. */
+    uint64_t surfels_planned, surfels_unread, surfels_outside, surfels_hidden, surfels_visible;
+    unsigned objects_in_view;
 } triptych_frame_stats;
 
 /* Returns the statistics of the last complete frame. Fails with TRIPTYCH_USAGE if there is none. */

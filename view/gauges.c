@@ -7,6 +7,7 @@
 
 #include "json.h"
 #include "report.h"
+#include "scene.h"
 
 void trip_gauges_note_answer(trip_gauges *g, double ms)
 {
@@ -68,7 +69,7 @@ static void add_document(cJSON *root, trip_viewer *v)
         cJSON_AddNumberToObject(root, "objects", d->scene.objects);
         cJSON_AddNumberToObject(root, "volumes", d->scene.volumes);
         cJSON_AddNumberToObject(root, "gaussians", (double)d->scene.gaussians);
-        cJSON_AddStringToObject(root, "order", draw_settings_choice(&d->settings, DRAW_ORDER));
+        cJSON_AddStringToObject(root, "order", trip_scene_order(&d->scene, &d->settings));
     }
     cJSON *dims = d && d->opened && !d->kind ? cJSON_AddArrayToObject(root, "dims") : NULL;
     for (int a = 0; a < 3 && dims; a++)

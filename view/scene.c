@@ -31,8 +31,16 @@ static bool has_choice(int row, int choice, const triptych_scene *scene)
         return false;
     if (row == DRAW_ORDER && choice == TRIPTYCH_ORDER_SHEETS - 1 && scene->moved)
         return false;
-    return has_gaussians(scene) && draw_settings_choice_applies(row, choice, DRAW_KIND_SCENE) &&
+    return has_gaussians(scene) &&
+           draw_settings_choice_applies(row, choice,
+                                        scene->clouds ? DRAW_KIND_CLOUD : DRAW_KIND_SCENE) &&
            (row != DRAW_HARMONICS || choice < scene->degree);
+}
+
+/* Returns the value that a row has if none is chosen. */
+static const char *standard_of(const trip_option *row, int number, const triptych_scene *scene)
+{
+    return number == DRAW_ORDER && scene->clouds ? "deferred" : row->standard;
 }
 
 int trip_scene_entries(const trip_scene_choice *choice, const triptych_scene *scene,
@@ -48,8 +56,8 @@ int trip_scene_entries(const trip_scene_choice *choice, const triptych_scene *sc
     for (int i = 0; row->choices[i] && count < TRIP_SCENE_ENTRIES; i++) {
         if (!has_choice(choice->row, i, scene))
             continue;
-        if (i == value ||
-            (value < 0 && !choice->standard && !strcmp(row->choices[i], row->standard)))
+        if (i == value || (value < 0 && !choice->standard &&
+                           !strcmp(row->choices[i], standard_of(row, choice->row, scene))))
             *chosen = count;
         add(&entries[count++], row->choices[i], row->choices[i]);
     }
@@ -65,6 +73,11 @@ void trip_scene_choose(const trip_scene_choice *choice, const trip_scene_entry *
     for (int i = 0; row->choices[i] && entry->value[0]; i++)
         if (!strcmp(row->choices[i], entry->value))
             *value = row->first + i;
+}
+
+const char *trip_scene_order(const triptych_scene *scene, const draw_settings *s)
+{
+    return s->scene.order || !scene->clouds ? draw_settings_choice(s, DRAW_ORDER) : "deferred";
 }
 
 /* Names the objects, unless one scene lies alone. */
@@ -84,11 +97,13 @@ void trip_scene_say(const triptych_scene *scene, const draw_settings *s,
                     const trip_frames_status *status, char *text, size_t bytes)
 {
     char peak[32], all[32];
+    const char *order = trip_scene_order(scene, s);
+    const bool deferred = !strcmp(order, "deferred");
     size_t at = (size_t)say_objects(scene, text, bytes);
     if (has_gaussians(scene) && at < bytes)
-        at += (size_t)snprintf(text + at, bytes - at, "%llu Gaussians by %s",
+        at += (size_t)snprintf(text + at, bytes - at, "%llu %s%s",
                                (unsigned long long)scene->gaussians,
-                               draw_settings_choice(s, DRAW_ORDER));
+                               deferred ? "surfels, " : "Gaussians by ", order);
     if (!status || !(status->whole_ms > 0) || at >= bytes)
         return;
     trip_format_bytes(status->stats.peak_memory_bytes, peak);

@@ -37,6 +37,8 @@ int trip_scene_entries(const trip_scene_choice *choice, const triptych_scene *sc
 void trip_scene_choose(const trip_scene_choice *choice, const trip_scene_entry *entry,
                        draw_settings *s);
 
+/* Returns the name of the order that is chosen, or of the default. */
+const char *trip_scene_order(const triptych_scene *scene, const draw_settings *s);
 /* Writes a line about the scene: objects, count and order. With `status`, adds time and memory of
  * the last full picture. */
 void trip_scene_say(const triptych_scene *scene, const draw_settings *s,

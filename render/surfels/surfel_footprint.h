@@ -5,12 +5,17 @@
 #include "gaussian_footprint.h"
 #include "surfel_picture.h"
 
-/* With d = p - (x, y): q = (across (d.x - shear d.y))^2 + (down d.y)^2. The depth z(p) is v in
+/* An ellipse: with d = p - (x, y), u = (across (d.x - shear d.y))^2 + (down d.y)^2. */
+typedef struct trip_surfel_ellipse {
+    double across, shear, down;
+} trip_surfel_ellipse;
+
+/* The depth z(p) is v in
  * parallel views and 1 / v in perspective, with v = base + slope_x d.x + slope_y d.y, limited to
  * [near, far]. Where v <= 0 in perspective, it is far. */
 typedef struct trip_surfel_footprint {
     double x, y, z;
-    double across, shear, down;
+    trip_surfel_ellipse blend, disc; /* q and u */
     double base, slope_x, slope_y, near, far;
     double tolerance, front; /* front: z' - t, at least 0 */
     double mass;             /* weight at the centre */
@@ -53,7 +58,7 @@ static inline double trip_surfel_extent(const trip_camera *c, const trip_gaussia
         along.y = 0;
     else
         along.z = 0;
-    return TRIP_SURFEL_RADIUS * trip_length(along);
+    return TRIP_SURFEL_WIDEN * TRIP_SURFEL_RADIUS * trip_length(along);
 }
 
 /* Returns the width of a pixel at a depth, in units of depth. */
@@ -82,10 +87,16 @@ static inline void trip_surfel_set_plane(const trip_camera *c, trip_vec3 normal,
     f->far = f->z + extent;
 }
 
-/* Sets the ellipse and the mass. Returns false if the ellipse does not reach the picture. */
-static inline bool trip_surfel_set_ellipse(const trip_camera *c, const trip_gaussian *g,
-                                           trip_vec3 deviations, double opacity,
-                                           trip_surfel_footprint *f)
+/* Returns the ellipse of a covariance with its determinant. */
+static inline trip_surfel_ellipse trip_surfel_ellipse_of(double xy, double yy, double determinant)
+{
+    return (trip_surfel_ellipse){ sqrt(yy / determinant), xy / yy, 1 / sqrt(yy) };
+}
+
+/* Sets the ellipses and the mass. Returns false if the larger one does not reach the picture. */
+static inline bool trip_surfel_set_ellipses(const trip_camera *c, const trip_gaussian *g,
+                                            trip_vec3 deviations, double opacity,
+                                            trip_surfel_footprint *f)
 {
     const trip_gaussian_footprint at = { .x = f->x, .y = f->y, .z = f->z };
     trip_vec3 jx, jy;
@@ -95,9 +106,10 @@ static inline bool trip_surfel_set_ellipse(const trip_camera *c, const trip_gaus
     const double xx = trip_dot(a, a), xy = trip_dot(a, b), yy = trip_dot(b, b);
     const double bare = trip_dot(trip_cross(a, b), trip_cross(a, b)), add = TRIP_SURFEL_LOW_PASS;
     const double filtered = bare + add * (xx + yy) + add * add;
-    f->across = sqrt((yy + add) / filtered);
-    f->shear = xy / (yy + add);
-    f->down = 1 / sqrt(yy + add);
+    const double widen = TRIP_SURFEL_WIDEN * TRIP_SURFEL_WIDEN, more = TRIP_SURFEL_DISC_PASS;
+    const double disc = widen * widen * bare + more * widen * (xx + yy) + more * more;
+    f->blend = trip_surfel_ellipse_of(xy, yy + add, filtered);
+    f->disc = trip_surfel_ellipse_of(widen * xy, widen * yy + more, disc);
     f->mass = opacity * fmax(TRIP_SURFEL_MASS_MIN, sqrt(bare / filtered));
     f->reach_x = sqrt(TRIP_SURFEL_REACH * (xx + add));
     f->reach_y = sqrt(TRIP_SURFEL_REACH * (yy + add));
@@ -106,10 +118,10 @@ static inline bool trip_surfel_set_ellipse(const trip_camera *c, const trip_gaus
            f->y - f->reach_y <= c->height;
 }
 
-/* Returns q at d = (dx, dy) from the centre. */
-static inline double trip_surfel_radius2(const trip_surfel_footprint *f, double dx, double dy)
+/* Returns the squared radius at d = (dx, dy) from the centre. */
+static inline double trip_surfel_radius2(const trip_surfel_ellipse *e, double dx, double dy)
 {
-    const double u = f->across * (dx - f->shear * dy), v = f->down * dy;
+    const double u = e->across * (dx - e->shear * dy), v = e->down * dy;
     return u * u + v * v;
 }
 
@@ -140,7 +152,7 @@ static inline bool trip_surfel_footprint_of(const trip_camera *c, const trip_gau
     const double by = c->ortho ? 1 : f->z;
     f->x = trip_dot(c->to_x, from_eye) / by;
     f->y = trip_dot(c->to_y, from_eye) / by;
-    if (!trip_surfel_set_ellipse(c, g, deviations, (double)g->opacity, f))
+    if (!trip_surfel_set_ellipses(c, g, deviations, (double)g->opacity, f))
         return false;
     const int normal = trip_surfel_axis(g);
     trip_surfel_set_plane(c, trip_surfel_principal(g, normal), from_eye,
@@ -154,14 +166,14 @@ static inline bool trip_surfel_footprint_of(const trip_camera *c, const trip_gau
     return true;
 }
 
-/* Returns the coverage at d = (dx, dy) from the centre. */
-static inline double trip_surfel_coverage(const trip_surfel_footprint *f, double dx, double dy)
+/* Returns the coverage by the disc at d = (dx, dy) from the centre. */
+static inline double trip_surfel_coverage(const trip_surfel_ellipse *e, double dx, double dy)
 {
-    const double u = f->across * (dx - f->shear * dy), v = f->down * dy;
-    const double gx = f->across * u, gy = f->down * v - f->across * f->shear * u;
+    const double u = e->across * (dx - e->shear * dy), v = e->down * dy;
+    const double gx = e->across * u, gy = e->down * v - e->across * e->shear * u;
     const double q = u * u + v * v, slope = sqrt(gx * gx + gy * gy), rim = TRIP_SURFEL_RIM;
     if (!(slope > 0))
-        return fmin(1, sqrt(rim) / f->across);
+        return fmin(1, sqrt(rim) / e->across);
     return fmax(0, fmin(1, (sqrt(q * rim) - q) / slope));
 }
 

@@ -6,23 +6,25 @@
  *
  * Surfel (surfel_footprint.h)
  * ---------------------------
- * A surfel is a flat Gaussian. Its disc is the ellipse with semi-axes of TRIP_SURFEL_RADIUS
- * deviations. The axis with the least deviation is its normal. This holds for coarse Gaussians,
- * too. Their deviations are multiplied by TRIP_SURFEL_MERGED, since discs must cover their voxels.
+ * A surfel is a flat Gaussian. Its radii are TRIP_SURFEL_RADIUS deviations. Its disc is larger by
+ * TRIP_SURFEL_WIDEN, since points are not spaced evenly. The axis with the least deviation is its
+ * normal. This holds for coarse Gaussians, too. Their deviations are multiplied by
+ * TRIP_SURFEL_MERGED, since discs must cover their voxels.
  *
- * Let (X, Y) be the pixel position of the centre and z its depth. Let r be the largest radius, and
- * w the width of a pixel at the centre, both in units of depth. With the covariance S and the
- * limited J of gaussian_picture.h:
+ * Let d = p - (X, Y) be the way from the pixel position of the centre to p, and z the depth of the
+ * centre. Let r be the largest radius, and w the width of a pixel at the centre, both in units of
+ * depth. With the covariance S and the limited J of gaussian_picture.h:
  *
- *     S2 = J S J^T + TRIP_SURFEL_LOW_PASS I,   q(p) = d^T S2^-1 d,   d = p - (X, Y)
+ *     S2 = J S J^T + TRIP_SURFEL_LOW_PASS I,                            q(p) = d^T S2^-1 d
+ *     S3 = TRIP_SURFEL_WIDEN^2 J S J^T + TRIP_SURFEL_DISC_PASS I,       u(p) = d^T S3^-1 d
  *
- * - The disc covers the positions with q <= TRIP_SURFEL_RIM. With the low-pass filter, it covers
- *   the pixel centre nearest to (X, Y) in any case.
+ * - The disc covers the positions with u <= TRIP_SURFEL_RIM. The filter lets it cover the pixel
+ *   centre nearest to (X, Y) in any case.
  * - z(p) is the depth at which the ray through p meets the plane of the disc. It is limited to
  *   [z - e, z + e], and at least 0. Here e is half the extent of the disc in depth. It is at least
  *   the change of the plane's depth over a pixel, up to TRIP_SURFEL_STEEP w: the filter covers so
  *   much.
- * - The weight at p is m (1 - q / TRIP_SURFEL_REACH)^4. This is near m exp(-0.7 q), and ends
+ * - The weight at p is m (1 - q / TRIP_SURFEL_REACH)^4, which is near m exp(-0.7 q). It ends
  *   smoothly. m is the opacity times sqrt(|J S J^T| / |S2|), so the filter keeps the mass (EWA,
  *   Zwicker et al. 2001). The root counts as at least TRIP_SURFEL_MASS_MIN.
  * - The tolerance is t = TRIP_SURFEL_OFFSET r + w.
@@ -66,10 +68,12 @@
     (1 / 0.85) /* in deviations: a surfel's radius, where its weight halves */
 #define TRIP_SURFEL_RIM 1.3862943611198906 /* 2 ln 2 */
 #define TRIP_SURFEL_LOW_PASS 0.48          /* px^2 */
-#define TRIP_SURFEL_REACH 6.0              /* squared deviations */
-#define TRIP_SURFEL_MERGED 1.7
+#define TRIP_SURFEL_DISC_PASS 0.4          /* px^2; RIM times this is above 1/2 */
+#define TRIP_SURFEL_WIDEN 1.5
+#define TRIP_SURFEL_REACH 6.0 /* squared deviations */
+#define TRIP_SURFEL_MERGED 1.3
 #define TRIP_SURFEL_OFFSET 1.0
-#define TRIP_SURFEL_STEEP 32.0 /* the tangent of the steepest plane that is followed */
+#define TRIP_SURFEL_STEEP 16.0 /* the tangent of the steepest plane that is followed */
 #define TRIP_SURFEL_MASS_MIN 1e-3
 
 enum {

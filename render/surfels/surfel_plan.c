@@ -201,7 +201,8 @@ bool trip_surfel_plan_bounds(const trip_surfel_plan *plan, const trip_camera *c,
     }
     /* The depth of a surfel may be less by its extent, and its front by its tolerance, too. Both
      * grow with the width of a pixel, more slowly than the depth. */
-    *depth = nearest - (1 + TRIP_SURFEL_OFFSET) * radius - growth * (c->ortho ? 1 : nearest);
+    *depth = nearest - (TRIP_SURFEL_WIDEN + TRIP_SURFEL_OFFSET) * radius -
+             growth * (c->ortho ? 1 : nearest);
     *depth -= 1e-6 * nearest;
     return *depth > 0;
 }

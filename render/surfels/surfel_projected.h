@@ -6,14 +6,23 @@
 #include "pixels.h"
 #include "surfel_footprint.h"
 
+typedef struct trip_surfel_oval {
+    float across, shear, down;
+} trip_surfel_oval;
+
 typedef struct trip_surfel_projected {
     float x, y;
-    float across, shear, down;
+    trip_surfel_oval blend, disc;
     float base, slope_x, slope_y, near, far;
     float tolerance, front;
     float mass;
     float rgb[3];
 } trip_surfel_projected;
+
+static inline trip_surfel_oval trip_surfel_oval_of(const trip_surfel_ellipse *e)
+{
+    return (trip_surfel_oval){ (float)e->across, (float)e->shear, (float)e->down };
+}
 
 /* The colour is left to the caller. */
 static inline trip_surfel_projected trip_surfel_project(const trip_surfel_footprint *f)
@@ -21,9 +30,8 @@ static inline trip_surfel_projected trip_surfel_project(const trip_surfel_footpr
     return (trip_surfel_projected){
         .x = (float)f->x,
         .y = (float)f->y,
-        .across = (float)f->across,
-        .shear = (float)f->shear,
-        .down = (float)f->down,
+        .blend = trip_surfel_oval_of(&f->blend),
+        .disc = trip_surfel_oval_of(&f->disc),
         .base = (float)f->base,
         .slope_x = (float)f->slope_x,
         .slope_y = (float)f->slope_y,
@@ -35,10 +43,9 @@ static inline trip_surfel_projected trip_surfel_project(const trip_surfel_footpr
     };
 }
 
-static inline float trip_surfel_projected_radius2(const trip_surfel_projected *p, float dx,
-                                                  float dy)
+static inline float trip_surfel_oval_radius2(const trip_surfel_oval *e, float dx, float dy)
 {
-    const float u = p->across * (dx - p->shear * dy), v = p->down * dy;
+    const float u = e->across * (dx - e->shear * dy), v = e->down * dy;
     return u * u + v * v;
 }
 
@@ -50,14 +57,13 @@ static inline float trip_surfel_projected_depth(const trip_surfel_projected *p, 
     return z < p->near ? p->near : z > p->far ? p->far : z;
 }
 
-static inline float trip_surfel_projected_coverage(const trip_surfel_projected *p, float dx,
-                                                   float dy)
+static inline float trip_surfel_oval_coverage(const trip_surfel_oval *e, float dx, float dy)
 {
     const float rim = (float)TRIP_SURFEL_RIM;
-    const float u = p->across * (dx - p->shear * dy), v = p->down * dy;
-    const float gx = p->across * u, gy = p->down * v - p->across * p->shear * u;
+    const float u = e->across * (dx - e->shear * dy), v = e->down * dy;
+    const float gx = e->across * u, gy = e->down * v - e->across * e->shear * u;
     const float q = u * u + v * v, slope = sqrtf(gx * gx + gy * gy);
-    const float inside = slope > 0 ? (sqrtf(q * rim) - q) / slope : sqrtf(rim) / p->across;
+    const float inside = slope > 0 ? (sqrtf(q * rim) - q) / slope : sqrtf(rim) / e->across;
     return inside > 0 ? inside < 1 ? inside : 1 : 0;
 }
 
@@ -67,20 +73,21 @@ static inline float trip_surfel_projected_weight(const trip_surfel_projected *p,
     return p->mass * square * square;
 }
 
-/* Returns the rows with squared radii up to `limit`, and perhaps one more a side. */
-static inline trip_pixels trip_surfel_rows(const trip_surfel_projected *p, float limit, int height)
+/* Returns the rows with squared radii up to `limit` about (x, y), and perhaps one more a side. */
+static inline trip_pixels trip_surfel_rows(const trip_surfel_oval *e, float y, float limit,
+                                           int height)
 {
-    const float half = sqrtf(limit) / p->down + 0.01f;
-    return trip_pixels_within((double)(p->y - half), (double)(p->y + half), height);
+    const float half = sqrtf(limit) / e->down + 0.01f;
+    return trip_pixels_within((double)(y - half), (double)(y + half), height);
 }
 
 /* Returns the columns of the row at dy with squared radii up to `limit`, and perhaps more. */
-static inline trip_pixels trip_surfel_columns(const trip_surfel_projected *p, float limit, float dy,
-                                              int width)
+static inline trip_pixels trip_surfel_columns(const trip_surfel_oval *e, float x, float limit,
+                                              float dy, int width)
 {
-    const float v = p->down * dy, rest = limit - v * v;
-    const float half = sqrtf(rest > 0 ? rest : 0) / p->across + 0.01f;
-    const float middle = p->x + p->shear * dy;
+    const float v = e->down * dy, rest = limit - v * v;
+    const float half = sqrtf(rest > 0 ? rest : 0) / e->across + 0.01f;
+    const float middle = x + e->shear * dy;
     return trip_pixels_within((double)(middle - half), (double)(middle + half), width);
 }
 

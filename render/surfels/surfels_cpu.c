@@ -171,14 +171,15 @@ static void lower_depth(trip_surfels_cpu *s, int x, int y, uint32_t depth)
 
 static void lower_depths(trip_surfels_cpu *s, const trip_surfel_projected *p)
 {
-    const trip_pixels rows = trip_surfel_rows(p, (float)TRIP_SURFEL_RIM, s->camera.height);
+    const trip_pixels rows =
+        trip_surfel_rows(&p->disc, p->y, (float)TRIP_SURFEL_RIM, s->camera.height);
     for (int y = rows.first; y <= rows.last; y++) {
         const float dy = (float)y + 0.5f - p->y;
         const trip_pixels columns =
-            trip_surfel_columns(p, (float)TRIP_SURFEL_RIM, dy, s->camera.width);
+            trip_surfel_columns(&p->disc, p->x, (float)TRIP_SURFEL_RIM, dy, s->camera.width);
         for (int x = columns.first; x <= columns.last; x++) {
             const float dx = (float)x + 0.5f - p->x;
-            if (trip_surfel_projected_radius2(p, dx, dy) <= (float)TRIP_SURFEL_RIM)
+            if (trip_surfel_oval_radius2(&p->disc, dx, dy) <= (float)TRIP_SURFEL_RIM)
                 lower_depth(s, x, y,
                             bits_of(trip_surfel_projected_depth(p, s->camera.ortho, dx, dy)));
         }
@@ -349,7 +350,7 @@ static void bound_row(void *context, unsigned row)
         if (!is_visible(s, (int)row, column))
             continue;
         const trip_surfel_projected *p = holder(s, (int)row, column);
-        const float half = sqrtf((float)TRIP_SURFEL_REACH) / p->down + 0.01f;
+        const float half = sqrtf((float)TRIP_SURFEL_REACH) / p->blend.down + 0.01f;
         reach.top = fminf(reach.top, p->y - half);
         reach.bottom = fmaxf(reach.bottom, p->y + half);
         reach.visible++;
@@ -364,24 +365,25 @@ static void blend_at(sum *to, const trip_surfel_projected *p, float q, float dx,
         to->rgb[k] += weight * p->rgb[k];
     to->tolerance += weight * p->tolerance;
     to->weight += weight;
-    if (q <= (float)TRIP_SURFEL_RIM && to->coverage < 1)
-        to->coverage += trip_surfel_projected_coverage(p, dx, dy);
+    if (to->coverage < 1 && trip_surfel_oval_radius2(&p->disc, dx, dy) <= (float)TRIP_SURFEL_RIM)
+        to->coverage += trip_surfel_oval_coverage(&p->disc, dx, dy);
 }
 
 /* Adds a visible surfel to the rows of a strip. */
 static void blend(trip_surfels_cpu *s, const trip_surfel_projected *p, int top, int end)
 {
-    trip_pixels rows = trip_surfel_rows(p, (float)TRIP_SURFEL_REACH, s->camera.height);
+    trip_pixels rows =
+        trip_surfel_rows(&p->blend, p->y, (float)TRIP_SURFEL_REACH, s->camera.height);
     rows.first = rows.first > top ? rows.first : top;
     rows.last = rows.last < end - 1 ? rows.last : end - 1;
     for (int y = rows.first; y <= rows.last; y++) {
         const float dy = (float)y + 0.5f - p->y;
         const trip_pixels columns =
-            trip_surfel_columns(p, (float)TRIP_SURFEL_REACH, dy, s->camera.width);
+            trip_surfel_columns(&p->blend, p->x, (float)TRIP_SURFEL_REACH, dy, s->camera.width);
         const size_t row = (size_t)y * (size_t)s->camera.width;
         for (int x = columns.first; x <= columns.last; x++) {
             const float dx = (float)x + 0.5f - p->x;
-            const float q = trip_surfel_projected_radius2(p, dx, dy);
+            const float q = trip_surfel_oval_radius2(&p->blend, dx, dy);
             const float z = trip_surfel_projected_depth(p, s->camera.ortho, dx, dy);
             if (q < (float)TRIP_SURFEL_REACH &&
                 fabsf(z - float_of(s->depths[row + (size_t)x])) <= p->tolerance)

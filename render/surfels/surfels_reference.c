@@ -79,12 +79,11 @@ void trip_surfels_reference_end(trip_surfels_reference *r)
 
 /* ---- visibility and selection ---- */
 
-/* Sets the pixels that may have squared radii up to `limit`. */
-static void bounds_of(const trip_surfels_reference *r, const trip_surfel_footprint *f, double limit,
+/* Sets the pixels that a surfel may reach. */
+static void bounds_of(const trip_surfels_reference *r, const trip_surfel_footprint *f,
                       trip_pixels *columns, trip_pixels *rows)
 {
-    const double share = sqrt(limit / TRIP_SURFEL_REACH);
-    const double x = share * f->reach_x + 1e-6, y = share * f->reach_y + 1e-6;
+    const double x = f->reach_x + 1e-6, y = f->reach_y + 1e-6;
     *columns = trip_pixels_within(f->x - x, f->x + x, r->camera.width);
     *rows = trip_pixels_within(f->y - y, f->y + y, r->camera.height);
 }
@@ -92,12 +91,12 @@ static void bounds_of(const trip_surfels_reference *r, const trip_surfel_footpri
 static void lower_depths(trip_surfels_reference *r, const trip_surfel_footprint *f)
 {
     trip_pixels columns, rows;
-    bounds_of(r, f, TRIP_SURFEL_RIM, &columns, &rows);
+    bounds_of(r, f, &columns, &rows);
     for (int y = rows.first; y <= rows.last; y++)
         for (int x = columns.first; x <= columns.last; x++) {
             const double dx = x + 0.5 - f->x, dy = y + 0.5 - f->y;
             double *depth = &r->depths[(size_t)y * (size_t)r->camera.width + (size_t)x];
-            if (trip_surfel_radius2(f, dx, dy) <= TRIP_SURFEL_RIM)
+            if (trip_surfel_radius2(&f->disc, dx, dy) <= TRIP_SURFEL_RIM)
                 *depth = fmin(*depth, trip_surfel_depth(f, r->camera.ortho, dx, dy));
         }
 }
@@ -139,11 +138,11 @@ static void blend(trip_surfels_reference *r, const cell *from)
 {
     const trip_surfel_footprint *f = &from->f;
     trip_pixels columns, rows;
-    bounds_of(r, f, TRIP_SURFEL_REACH, &columns, &rows);
+    bounds_of(r, f, &columns, &rows);
     for (int y = rows.first; y <= rows.last; y++)
         for (int x = columns.first; x <= columns.last; x++) {
             const double dx = x + 0.5 - f->x, dy = y + 0.5 - f->y;
-            const double q = trip_surfel_radius2(f, dx, dy);
+            const double q = trip_surfel_radius2(&f->blend, dx, dy);
             const size_t at = (size_t)y * (size_t)r->camera.width + (size_t)x;
             sum *to = &r->sums[at];
             if (!(q < TRIP_SURFEL_REACH && fabs(trip_surfel_depth(f, r->camera.ortho, dx, dy) -
@@ -154,8 +153,8 @@ static void blend(trip_surfels_reference *r, const cell *from)
                 to->rgb[k] += weight * from->rgb[k];
             to->tolerance += weight * f->tolerance;
             to->weight += weight;
-            if (q <= TRIP_SURFEL_RIM)
-                to->coverage += trip_surfel_coverage(f, dx, dy);
+            if (trip_surfel_radius2(&f->disc, dx, dy) <= TRIP_SURFEL_RIM)
+                to->coverage += trip_surfel_coverage(&f->disc, dx, dy);
         }
 }
 

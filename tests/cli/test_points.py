@@ -82,7 +82,7 @@ class Points(program.ProgramTest):
         """exp(-(1 / 0.85)^2 / 2) is 0.5006. The filter of 0.3 square pixels widens 10 pixels a bit."""
         write_cloud("one.ply", [[0, 0, 0]])
         for options, radius in ((("--radius", "0.5"),), 0.5), ((("--radius", "0.25"),), 0.25):
-            picture = self.front("one.ply", *options[0])
+            picture = self.front("one.ply", *options[0], "--order", "depth")
             self.assertGreater(picture[32, 32, 3], 0.98)
             at = 32 + int(round(radius * 65 / 2))
             exact = (at - 32) / (65 / 2) / radius
@@ -101,12 +101,31 @@ class Points(program.ProgramTest):
 
     def test_the_radius_of_a_file_holds_and_a_factor_multiplies_it(self):
         write_cloud("one.ply", [[0, 0, 0]], radius=[0.2], nx=[0], ny=[0], nz=[1])
-        plain, twice = self.front("one.ply"), self.front("one.ply", "--radius", "2x")
+        order = "--order", "depth"
+        plain, twice = self.front("one.ply", *order), self.front("one.ply", *order, "--radius", "2x")
         expected = 2 * math.pi * 0.85 ** 2 * (65 / 2) ** 2
         for picture, radius in (plain, 0.2), (twice, 0.4):
             # the mass of a Gaussian of opacity 0.99, and of its filter
             mass = picture[:, :, 3].sum() / 0.99 - 2 * math.pi * 0.3
             self.assertAlmostEqual(mass / (expected * radius ** 2), 1, delta=0.03)
+
+    def test_a_deferred_point_is_a_disc(self):
+        """Its area is that of the ellipse of surfel_picture.h. Deferred is the default."""
+        turn = math.radians(60)
+        write_cloud("one.ply", [[0, 0, 0]], radius=[0.3], nx=[0], ny=[0], nz=[1])
+        write_cloud("turned.ply", [[0, 0, 0]], radius=[0.3], nx=[math.sin(turn)], ny=[0],
+                    nz=[math.cos(turn)])
+        for name, share in ("one.ply", 1), ("turned.ply", 0.5):
+            picture = self.front(name)[:, :, 3]
+            # u <= 2 ln 2, with 1.5 deviations of 0.85 radii and a filter of 0.4 square pixels.
+            # Coverage rises from 0 to 1 over the pixel inside the rim.
+            deviation = 1.5 * 0.85 * 0.3 * 65 / 2
+            wide, high = (math.sqrt(2 * math.log(2) * ((deviation * s) ** 2 + 0.4)) - 0.5
+                          for s in (share, 1))
+            self.assertAlmostEqual(picture.sum() / (math.pi * wide * high), 1, delta=0.02)
+            self.assertEqual(picture[32, 32], 1)
+            self.assertEqual(picture[0, 0], 0)
+            numpy.testing.assert_array_equal(picture, self.front(name, "--order", "deferred")[:, :, 3])
 
     def test_the_normal_of_a_file_turns_a_point(self):
         """Seen at 60 degrees from its normal, a disc is half as wide."""
@@ -121,7 +140,7 @@ class Points(program.ProgramTest):
     def test_surfaces_have_no_holes(self):
         """Square and random points, straight on and from the side."""
         random = numpy.random.default_rng(4).uniform(-1.5, 1.5, (6000, 3)) * [1, 1, 0]
-        for name, points, share in ("grid", grid(60), 0), ("random", random, 0.01):
+        for name, points, share in ("grid", grid(60), 0), ("random", random, 0.02):
             write_cloud(name + ".ply", points)
             for eye in "0,0,5", "3,0,4":
                 inner = self.front(name + ".ply", eye=eye)[12:-12, 12:-12, 3]
@@ -336,7 +355,7 @@ class Points(program.ProgramTest):
                                     says="does not apply to Gaussian scenes")
         write_cloud("a.ply", grid(4))
         self.leaves_nothing(2, "render", "a.ply", "-o", "no.png", "--effects", "shadows",
-                            says="must be edl, auto or none for clouds of points")
+                            says="must be edl or none")
 
     # ---- up ----
 

@@ -119,7 +119,7 @@ static void settings_of_another_kind_of_data_are_refused_and_dropped(void **stat
     } cases[] = {
         { "--effects occlusion --order lists", DRAW_KIND_SCENE, "--effects: must be edl or none",
           " --order lists" },
-        { "--effects edl,cueing --edl-radius 2", DRAW_KIND_CLOUD, "--effects: must be edl, auto",
+        { "--effects edl,cueing --edl-radius 2", DRAW_KIND_CLOUD, "--effects: must be edl or none",
           " --effects edl --edl-radius 2" },
         { "--effects edl --quality high", DRAW_KIND_VOLUME, "--effects: edl applies to Gaussian",
           " --quality high" },

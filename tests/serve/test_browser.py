@@ -336,7 +336,7 @@ class SceneInBrowser(Page):
         self.ready("#order")
         shown = {"Order", "Footprint", "Harmonics", "Opacity", "Background", "Early termination", "Parallel view",
                  "Clip box", "Eye-dome lighting"}
-        for order, more in ("depth", set()), ("lists", {"Method", "Blend start (h)"}), ("depth", set()):
+        for order, more in ("depth", set()), ("lists", {"Method", "Blend start (h)", "Debug view"}), ("depth", set()):
             self.choose("#order", f"value = '{order}'")
             for _ in range(500):
                 if self.labels() == shown | more:

@@ -16,7 +16,7 @@ static const trip_scene_choice *choice_of(int row)
 static void every_order_of_the_library_is_an_entry(void **state)
 {
     (void)state;
-    const triptych_scene scene = { .degree = 3 };
+    const triptych_scene scene = { .degree = 3, .clouds = 1 }, other = { .degree = 3 };
     const char *const *names = draw_settings_table.rows[DRAW_ORDER].choices;
     trip_scene_entry e[TRIP_SCENE_ENTRIES];
     int chosen, count = 0;
@@ -24,7 +24,10 @@ static void every_order_of_the_library_is_an_entry(void **state)
         count++;
     draw_settings s = { 0 };
     assert_int_equal(trip_scene_entries(choice_of(DRAW_ORDER), &scene, &s, e, &chosen), count);
+    assert_string_equal(e[chosen].value, "deferred");
+    assert_int_equal(trip_scene_entries(choice_of(DRAW_ORDER), &other, &s, e, &chosen), count - 1);
     assert_string_equal(e[chosen].value, "depth");
+    trip_scene_entries(choice_of(DRAW_ORDER), &scene, &s, e, &chosen);
     for (int i = 0; i < count; i++) {
         int again;
         assert_string_equal(e[i].value, names[i]);

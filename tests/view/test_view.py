@@ -652,7 +652,7 @@ class View(program.ProgramTest):
             self.fails(2, "view", "scene.trip", "noise.trip", *options, says="applies to Gaussian scenes only",
                        env=self.screen.environment)
 
-    REFUSED = [(["--tf=bone"], "--tf: does not apply"), (["--effects=occlusion"], "--effects: does not apply"),
+    REFUSED = [(["--tf=bone"], "--tf: does not apply"), (["--effects=occlusion"], "--effects: must be edl or none"),
                (["--quality=high"], "--quality: does not apply"), (["--engine=io_uring"], "--engine: must be pread"),
                (["--h=0.5"], "--h: does not apply to scenes with --order depth"),
                (["--kernel=fixed"], "fixed does not apply"),
@@ -663,7 +663,7 @@ class View(program.ProgramTest):
         said = self.view(f"wait\npicture a.exr\nset --effects occlusion\nset --h 0.2\nwait\npicture b.exr\n"
                          f"drop {os.path.abspath('f.tf')}\nwait\nstatus status.json\npicture c.exr\n"
                          "screenshot said.exr\n", "scene.trip")
-        self.assertIn("--effects: does not apply to Gaussian scenes", said)
+        self.assertIn("--effects: must be edl or none for Gaussian scenes", said)
         self.assertIn("--h: does not apply", said)
         for name in "b", "c":
             self.assertTrue((program.read_exr("a.exr") == program.read_exr(f"{name}.exr")).all(), name)
@@ -761,7 +761,7 @@ class View(program.ProgramTest):
         self.write_objects()
         program.write("bare.nrrd", b"not a volume")
         file = lambda *objects: json.dumps({"objects": objects}).encode()
-        bad = ((b"{", "is not JSON"), (file(), "1 to 1000 objects"), (file({"data": "none.ply"}), "none.ply"),
+        bad = ((b"{", "is not JSON"), (file(), "1 to 16384 objects"), (file({"data": "none.ply"}), "none.ply"),
                (file({"data": "none.trip"}), "none.trip"), (file({"data": "bad.json"}), "is a scene file itself"),
                (file({"data": "scene.ply", "tf": "bone"}), "leave out tf"),
                (file({"data": "noise.nrrd", "tf": "none.tf"}), "none.tf"),

@@ -1,0 +1,144 @@
+"""Tests of the deferred pictures of clouds (render/surfels/surfel_picture.h) by the program: they
+depend neither on memory, threads, earlier pictures nor on what is hidden. Expected colours are
+closed forms."""
+import json
+import os
+import unittest
+
+import numpy
+
+import program
+from test_points import grid, write_cloud
+
+VIEW = ("--size", "160x120", "--eye", "0,0,8", "--look", "0,0,0", "--up", "0,1,0", "--fov", "30")
+
+
+def coloured(path, points, rgb, **more):
+    n = len(points)
+    write_cloud(path, points, red=[rgb[0]] * n, green=[rgb[1]] * n, blue=[rgb[2]] * n, **more)
+
+
+def ball(count, radius=1):
+    """Returns points that are spread evenly over a sphere, and their normals."""
+    n = numpy.arange(count) + 0.5
+    z, turn = 1 - 2 * n / count, numpy.pi * (1 + 5**0.5) * n
+    at = numpy.stack([numpy.cos(turn) * (1 - z * z) ** 0.5, numpy.sin(turn) * (1 - z * z) ** 0.5, z], 1)
+    return radius * at, at
+
+
+class Deferred(program.ProgramTest):
+    def write_json(self, path, value):
+        program.write(path, json.dumps(value).encode())
+        return path
+
+    def test_overlapping_scans_of_one_wall_have_the_mean_colour(self):
+        """Two scans of a wall lie closer than a radius, with noise. Neither hides the other in
+        spots: each pixel has nearly the mean of red and green."""
+        r = numpy.random.default_rng(1)
+        one, two = grid(90), grid(90) + [0.02, 0.02, 0]
+        points = numpy.concatenate([one, two])
+        points[:, 2] += r.uniform(-0.008, 0.008, len(points))
+        n = len(one)
+        write_cloud("scans.ply", points, red=[200] * n + [0] * n, green=[0] * n + [200] * n,
+                    blue=[0] * 2 * n, nx=[0] * 2 * n, ny=[0] * 2 * n, nz=[1] * 2 * n)
+        view = ("--size", "120x120", "--eye", "0,0,9", "--look", "0,0,0", "--up", "0,1,0", "--ortho", "2")
+        picture = self.picture("scans.ply", *view)
+        self.assertTrue((picture[:, :, 3] == 1).all())
+        far = 255 * abs(picture[:, :, :2] - 100 / 255)
+        self.assertLess(far.mean(), 25)
+        # by depth, a pixel shows the scan whose point happens to be nearer
+        self.assertGreater((255 * abs(self.picture("scans.ply", *view, "--order", "depth")[:, :, :2] -
+                                      100 / 255)).mean(), 2 * far.mean())
+
+    def test_what_is_hidden_is_not_read_and_does_not_count(self):
+        """A wall covers the picture. 200,000 points behind it change no bit."""
+        r = numpy.random.default_rng(5)
+        coloured("wall.ply", 0.9 * grid(160) + [0, 0, 2], (200, 120, 40))
+        coloured("behind.ply", r.uniform(-1, 1, (200000, 3)), (0, 0, 255))
+        self.write_json("both.json", {"objects": [{"data": "behind.ply"}, {"data": "wall.ply"}]})
+        self.write_json("alone.json", {"objects": [{"data": "wall.ply"}]})
+        for more in (), ("--ortho", "3"):
+            view = VIEW[:-2] + more if more else VIEW
+            one, two = (self.picture(name, *view) for name in ("alone.json", "both.json"))
+            numpy.testing.assert_array_equal(one, two)
+            self.assertTrue((one[:, :, 3] == 1).all())
+            numpy.testing.assert_allclose(one[60, 80, :3], numpy.array((200, 120, 40)) / 255, atol=0.005)
+            frame = self.stats("both.json", *view)["frames"][0]
+            fates = frame["surfels"]
+            self.assertEqual(fates["objects_in_view"], 2)
+            self.assertGreater(fates["unread"], 150000)
+            self.assertEqual(fates["planned"], fates["unread"] + fates["read"])
+            self.assertLessEqual(fates["visible"], fates["read"] - fates["hidden"] - fates["outside"])
+            self.assertLess(frame["bytes_read"], 24 * 60000)
+
+    def test_memory_threads_and_the_reference_agree(self):
+        at, normal = ball(60000)
+        colours = ((at + 1) * 127).round()
+        write_cloud("ball.ply", at, red=colours[:, 0], green=colours[:, 1], blue=colours[:, 2],
+                    nx=normal[:, 0], ny=normal[:, 1], nz=normal[:, 2])
+        view = ("--size", "200x150", "--eye", "1,2,3", "--look", "0,0,0")
+        one = self.picture("ball.ply", *view)
+        for options in ("--memory", "32M"), ("--threads", "1"), ("--threads", "5"):
+            numpy.testing.assert_array_equal(one, self.picture("ball.ply", *view, *options), str(options))
+        other = self.picture("ball.ply", *view, "--renderer", "reference")
+        self.assertLess(255 * abs(one - other).mean(), 0.05)
+        self.fails(1, "render", "ball.ply", "-o", "x.png", "--size", "4000", "--memory", "24M",
+                   says="raise --memory")
+
+    def test_a_large_turn_between_two_pictures_leaves_no_holes(self):
+        """Figure 3 of Guennebaud et al. 2004. Each picture of a path has the bits of a picture alone,
+        whatever was visible before."""
+        at, normal = ball(40000)
+        colours = numpy.where((at[:, :1] * at[:, 1:2] * at[:, 2:] > 0), 230, 40).repeat(3, 1)
+        write_cloud("ball.ply", at, red=colours[:, 0], green=colours[:, 1], blue=colours[:, 2],
+                    nx=normal[:, 0], ny=normal[:, 1], nz=normal[:, 2])
+        eyes = [0, 0, 4], [3.5, 1, -2], [0, 0, 4], [-4, 0, 0.5]
+        keys = [{"seconds": i, "eye": eye, "look": [0, 0, 0], "up": [0, 1, 0], "fov": 40}
+                for i, eye in enumerate(eyes)]
+        self.write_json("turn.json", {"triptych_path": 1, "frames_per_second": 1, "keys": keys})
+        self.works("render", "ball.ply", "-o", "turn.exr", "--path", "turn.json", "--size", "160x160",
+                   "--in-flight", "1")
+        names = sorted(n for n in os.listdir(".") if n.startswith("turn") and n.endswith(".exr"))
+        self.assertEqual(len(names), len(eyes))
+        for name, eye in zip(names, eyes):
+            alone = self.picture("ball.ply", "--size", "160x160", "--fov", "40", "--look", "0,0,0", "--up",
+                                 "0,1,0", "--eye", ",".join(map(str, eye)))
+            numpy.testing.assert_array_equal(program.read_exr(name), alone, name)
+            y, x = numpy.mgrid[:160, :160] + 0.5
+            # the ball's silhouette lies at the angle asin(1 / distance)
+            radius = 80 * numpy.tan(numpy.arcsin(1 / numpy.linalg.norm(eye))) / numpy.tan(numpy.radians(20))
+            far = numpy.hypot(x - 80, y - 80)
+            self.assertTrue((alone[far < radius - 2, 3] > 0.999).all())
+            self.assertTrue((alone[far > radius + 2.5, 3] == 0).all())
+
+    def test_instances_count_once_each(self):
+        """A row of balls. The first one hides the others, which are smaller."""
+        at, normal = ball(5000, 0.5)
+        coloured("ball.ply", at, (90, 160, 20), nx=normal[:, 0], ny=normal[:, 1], nz=normal[:, 2])
+        row = [{"data": "ball.ply", "translate": [0, 0, -1.2 * i], "scale": 0.3 if i else 1}
+               for i in range(2000)]
+        self.write_json("row.json", {"objects": row})
+        stats = self.stats("row.json", "--size", "300x300", "--eye", "0,0,3", "--look", "0,0,0", "--up",
+                           "0,1,0", "--ortho", "1.5")["frames"][0]["surfels"]
+        self.assertEqual(stats["objects_in_view"], 2000)
+        self.assertLess(stats["read"], 20 * 5000)
+        aside = self.stats("row.json", "--size", "100x100", "--eye", "0,0,3", "--look", "9,0,3", "--up",
+                           "0,1,0", "--fov", "40")["frames"][0]["surfels"]
+        self.assertEqual((aside["objects_in_view"], aside["planned"]), (0, 0))
+
+    def test_what_does_not_apply_is_refused(self):
+        coloured("a.ply", grid(9), (1, 2, 3))
+        for options, says in ((("--kernel", "exact"), "does not apply to --order deferred"),
+                              (("--early-termination", "0.1"), "does not apply to --order deferred"),
+                              (("--h", "0.5"), "nothing to merge"),
+                              (("--renderer", "gl"), "deferred requires"),
+                              (("--renderer", "integral"), "has no order")):
+            self.leaves_nothing(2, "render", "a.ply", "-o", "x.png", "--order", "deferred", *options,
+                                says=says)
+        donut = os.path.join(program.DATASETS, "donut_slice.ply")
+        self.leaves_nothing(2, "render", donut, "-o", "x.png", "--order", "deferred",
+                            says="deferred requires clouds of points")
+
+
+if __name__ == "__main__":
+    program.main()
