@@ -24,6 +24,7 @@ static const struct {
     bool makes_volumes; /* makes its own volumes if no data set is named */
     bool opens;         /* opens the data set itself */
     bool of_scenes;     /* also measures data sets of Gaussian scenes */
+    bool of_clouds;     /* only measures data sets of clouds of points */
 } tables[] = {
     { .name = "orders", .run_scene = bench_orders, .of_scenes = true },
     { .name = "submit", .run_scene = bench_submit },
@@ -34,6 +35,7 @@ static const struct {
     { .name = "flight", .run = bench_flight, .opens = true, .of_scenes = true },
     { .name = "ewa", .run = bench_ewa },
     { .name = "variants", .run_scene = bench_variants },
+    { .name = "surfels", .run = bench_surfels, .opens = true, .of_clouds = true },
 };
 
 /* Returns whether the frames are shaded: pre by the stored normals, post by differences of
@@ -128,9 +130,10 @@ static int check_plot(const bench_options *o)
 /* Checks the options for a Gaussian scene. */
 static int check_scene(const bench_options *o, size_t table)
 {
-    if (!tables[table].of_scenes)
+    if (!tables[table].of_scenes && !tables[table].of_clouds)
         return trip_fail(TRIP_USAGE, "usage", o->input,
-                         "is a Gaussian scene; only the tables orders and flight measure it");
+                         "is a Gaussian scene; only the tables orders and flight measure it, and "
+                         "surfels for clouds");
     if (tables[table].opens)
         return 0;
     if (!o->usual || o->tf)
@@ -147,6 +150,9 @@ static int measure(bench_options *o, bench_report *r)
     const size_t table = table_of(o);
     const bool scene = o->input && trip_gaussian_set_is(o->input);
     int status = scene ? check_scene(o, table) : 0;
+    if (!scene && tables[table].of_clouds)
+        status = trip_fail(TRIP_USAGE, "usage", o->table,
+                           "measures a data set that `triptych brick` made of a cloud of points");
     if (o->input && !scene && trip_gaussian_file_is(o->input))
         status = trip_fail(TRIP_USAGE, "usage", o->input,
                            "is a Gaussian scene; `triptych brick` makes a data set of it");

@@ -332,6 +332,16 @@ static const struct table {
         .renderers = { TRIP_RENDERER_CPU },
         .renderer_count = 1,
     },
+    {
+        .name = "surfels",
+        .refused = OF_FLIGHT | BIT(PLOT) | OF_LEVELS | OF_DRAWING | BIT(ENGINE) | BIT(NO_COUNTS) |
+                   BIT(VIEWS) | BIT(RENDERER) | BIT(TF),
+        .repeat = 3,
+        .sizes = { { 512, 512 } },
+        .size_count = 1,
+        .renderers = { TRIP_RENDERER_CPU },
+        .renderer_count = 1,
+    },
 };
 
 /* State of parsing: the options that were given, for the check against the table. */
@@ -393,8 +403,9 @@ static void be_short(parse *p)
 static int check(void *user)
 {
     parse *p = user;
-    static const char *const names[] = { "orders", "submit", "stream",   "renderers", "popping",
-                                         "levels", "flight", "variants", "ewa",       NULL };
+    static const char *const names[] = { "orders",  "submit",  "stream", "renderers",
+                                         "popping", "levels",  "flight", "variants",
+                                         "ewa",     "surfels", NULL };
     bench_options *o = p->o;
     int which;
     if (!o->table)

@@ -48,6 +48,7 @@ typedef struct bench_options {
     "  ewa        error and time of the affine EWA footprints\n"                                   \
     "  orders     ordering methods of Hofsetz & Max 2005, Tables 1 and 2; the orders\n"            \
     "             of a Gaussian scene, and lists beside a sort in each frame\n"                    \
+    "  surfels    selection of visible surfels of Guennebaud et al. 2004, Tables 1, 2\n"           \
     "  submit     forms of submission of Hofsetz, Max & Bastos 2008, Tables 3, 4\n"                \
     "  variants   changes of the picture by the shortcuts of the papers\n"
 

@@ -16,6 +16,8 @@ int bench_levels(const session *s, const bench_options *o, bench_report *r);
 int bench_finer(const bench_options *o, bench_report *r);
 /* Ignores s, and opens the data set as the viewer does. */
 int bench_flight(const session *s, const bench_options *o, bench_report *r);
+/* Ignores s, and opens the data set. */
+int bench_surfels(const session *s, const bench_options *o, bench_report *r);
 int bench_ewa(const session *s, const bench_options *o, bench_report *r);
 int bench_variants(bench_scene *scene, const bench_options *o, bench_report *r);
 /* Adds the row of the default of `render` to the table renderers. */

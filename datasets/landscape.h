@@ -10,16 +10,7 @@
 
 #include <stdint.h>
 
-#define TRIP_LANDSCAPE_CELL 1.25 /* the widest scene with scale 1 has the width 1 */
-#define TRIP_LANDSCAPE_SMALLEST 0.7
-#define TRIP_LANDSCAPE_LARGEST 1.2
-#define TRIP_LANDSCAPE_SCENES_MAX 64
-
-enum { TRIP_LANDSCAPE_GROUND = 16 }; /* ground Gaussians along each side of a cell */
-
-/* Returns the height of the ground:
- * 0.8 sin(0.35 x + 0.6) cos(0.27 z) + 0.2 sin(0.9 z + 0.4 x). */
-double trip_landscape_height(double x, double z);
+#include "landscape_cells.h"
 
 /* Writes exactly `count` Gaussians. The last copy may be incomplete. */
 int trip_landscape_write(const char *output, const char *const *scenes, int scene_count,

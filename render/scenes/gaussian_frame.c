@@ -365,7 +365,7 @@ static trip_gaussian_frame_stats stats_of_surfels(const trip_gaussian_frame *f)
         .surfels = s,
         .layers = 1,
         .done = s.done,
-        .draw_ms = s.draw_ms,
+        .draw_ms = s.project_ms,
         .read_ms = s.read_ms,
         .merge_ms = s.blend_ms,
     };

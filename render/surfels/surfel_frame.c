@@ -29,7 +29,8 @@ typedef struct part {
 struct trip_surfel_frame {
     trip_surfel_frame_params params;
     trip_surfel_plan plan;
-    size_t next; /* in the order of the plan */
+    size_t next;   /* in the order of the plan */
+    bool blending; /* the second time */
     trip_surfels_cpu *cpu;
     trip_surfels_reference *reference;
     unsigned char *buffer;
@@ -83,10 +84,12 @@ static int begin_picture(trip_surfel_frame *f)
     const trip_surfel_frame_params *p = &f->params;
     if (p->reference)
         return trip_surfels_reference_begin(&f->reference, p->camera, &p->settings, p->budget);
-    return trip_surfels_cpu_begin(&f->cpu, &(trip_surfels_cpu_params){ .camera = p->camera,
-                                                                       .settings = &p->settings,
-                                                                       .budget = p->budget,
-                                                                       .runner = &p->runner });
+    return trip_surfels_cpu_begin(&f->cpu,
+                                  &(trip_surfels_cpu_params){ .camera = p->camera,
+                                                              .settings = &p->settings,
+                                                              .budget = p->budget,
+                                                              .runner = &p->runner,
+                                                              .unselected = p->unselected });
 }
 
 static int make_plan(trip_surfel_frame *f)
@@ -286,9 +289,10 @@ static int draw_batch(trip_surfel_frame *f)
     int status = read_batch(f, &count);
     const double begun = trip_now_ms();
     if (!status)
-        status = f->cpu ? trip_surfels_cpu_add_from(f->cpu, get_surfel, f, count)
-                        : draw_in_reference(f, count);
-    f->stats.draw_ms += trip_now_ms() - begun;
+        status = !f->cpu       ? draw_in_reference(f, count)
+                 : f->blending ? trip_surfels_cpu_blend_from(f->cpu, get_surfel, f, count)
+                               : trip_surfels_cpu_add_from(f->cpu, get_surfel, f, count);
+    *(f->blending ? &f->stats.blend_ms : &f->stats.project_ms) += trip_now_ms() - begun;
     const double planned = (double)f->stats.planned;
     f->stats.done = planned > 0 ? (double)(f->stats.read + f->stats.unread) / planned : 1;
     return status;
@@ -299,6 +303,10 @@ int trip_surfel_frame_step(trip_surfel_frame *f, uint64_t deadline_ns)
     int status = trip_frame_poll();
     while (!status && f->next < f->plan.count) {
         status = draw_batch(f);
+        if (!status && f->params.unselected && !f->blending && f->next == f->plan.count) {
+            f->blending = true;
+            f->next = 0;
+        }
         if (!status)
             status = trip_frame_poll();
         if (!status && f->next < f->plan.count && trip_now_ns() >= deadline_ns)

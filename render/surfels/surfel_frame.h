@@ -24,6 +24,7 @@ typedef struct trip_surfel_frame_params {
     /* Bricks of an earlier picture of the same sets. The complete picture replaces them. It must
      * outlive the frame; NULL: none. */
     trip_surfel_history *history;
+    bool unselected; /* blends all surfels, and reads them twice (surfels_cpu.h) */
     trip_budget *budget;
     trip_task_runner runner;
 } trip_surfel_frame_params;
@@ -39,7 +40,7 @@ typedef struct trip_surfel_frame_stats {
     uint64_t visible; /* in the last picture */
     uint64_t bricks, bytes_read;
     double done; /* share of the frame, 0 to 1 */
-    double read_ms, draw_ms, blend_ms;
+    double read_ms, project_ms, blend_ms;
 } trip_surfel_frame_stats;
 
 /* Fails (reported) before it reads anything if the budget is too small. */

@@ -54,6 +54,7 @@ struct trip_surfels_cpu {
     const void *context;
     size_t from, count;
     uint64_t outside, hidden; /* counted by tasks */
+    bool unselected, blending;
 
     trip_surfels_cpu_stats stats;
 };
@@ -126,6 +127,7 @@ int trip_surfels_cpu_begin(trip_surfels_cpu **out, const trip_surfels_cpu_params
             .settings = *params->settings,
             .budget = params->budget,
             .runner = params->runner ? *params->runner : (trip_task_runner){ 0 },
+            .unselected = params->unselected,
             .pixels = (size_t)c->width * (size_t)c->height,
             .pitch = c->width + 2 * TRIP_SURFEL_GUARD,
             .cell_rows = c->height + 2 * TRIP_SURFEL_GUARD,
@@ -204,7 +206,8 @@ static bool is_hidden(const trip_surfels_cpu *s, const double lo[2], const doubl
                       float depth)
 {
     const int width = s->camera.width, height = s->camera.height;
-    return trip_depth_pyramid_is_before(&s->pyramid, clamped(lo[0], width), clamped(lo[1], height),
+    return !s->unselected &&
+           trip_depth_pyramid_is_before(&s->pyramid, clamped(lo[0], width), clamped(lo[1], height),
                                         clamped(hi[0], width), clamped(hi[1], height), depth);
 }
 
@@ -250,6 +253,8 @@ static void project(trip_surfels_cpu *s, size_t i, skipped *skip)
     const int column = trip_surfel_cell(f.x, s->camera.width) + TRIP_SURFEL_GUARD;
     const int row = trip_surfel_cell(f.y, s->camera.height) + TRIP_SURFEL_GUARD;
     s->batch_cells[i] = (uint32_t)row * (uint32_t)s->pitch + (uint32_t)column;
+    if (s->blending)
+        return;
     lower_depths(s, p);
     lower_key(s, s->batch_cells[i], key_of(p, s->batch_numbers[i]));
 }
@@ -327,6 +332,16 @@ int trip_surfels_cpu_add(trip_surfels_cpu *s, const trip_gaussian *surfels, size
 
 /* ---- blending ---- */
 
+static void divide(sum *at)
+{
+    at->coverage = fminf(1, at->coverage);
+    if (!(at->weight > 0))
+        return;
+    for (int k = 0; k < 3; k++)
+        at->rgb[k] /= at->weight;
+    at->tolerance /= at->weight;
+}
+
 /* Returns whether a cell holds a visible surfel. */
 static bool is_visible(const trip_surfels_cpu *s, int row, int column)
 {
@@ -392,16 +407,6 @@ static void blend(trip_surfels_cpu *s, const trip_surfel_projected *p, int top, 
     }
 }
 
-static void divide(sum *at)
-{
-    at->coverage = fminf(1, at->coverage);
-    if (!(at->weight > 0))
-        return;
-    for (int k = 0; k < 3; k++)
-        at->rgb[k] /= at->weight;
-    at->tolerance /= at->weight;
-}
-
 /* Blends the visible surfels in the order of their cells. So no bit depends on the strips. */
 static void blend_strip(void *context, unsigned strip)
 {
@@ -420,6 +425,45 @@ static void blend_strip(void *context, unsigned strip)
     }
     for (size_t i = 0; i < count; i++)
         divide(&sums[i]);
+}
+
+static void blend_batch(void *context, unsigned strip)
+{
+    trip_surfels_cpu *s = context;
+    const int top = (int)strip * STRIP;
+    const int end = top + STRIP < s->camera.height ? top + STRIP : s->camera.height;
+    for (size_t i = 0; i < s->count; i++)
+        if (s->batch_cells[i] != NO_CELL)
+            blend(s, &s->batch[i], top, end);
+}
+
+int trip_surfels_cpu_blend_from(trip_surfels_cpu *s, trip_surfel_getter *get, const void *context,
+                                size_t count)
+{
+    const uint64_t began = trip_now_ns();
+    if (!s->blending)
+        memset(s->sums, 0, s->pixels * sizeof *s->sums);
+    s->blending = true;
+    s->get = get;
+    s->context = context;
+    for (s->from = 0; s->from < count; s->from += s->count) {
+        const int status = trip_frame_poll();
+        if (status)
+            return status;
+        s->count = count - s->from < s->batch_max ? count - s->from : s->batch_max;
+        trip_run_tasks(&s->runner, project_some, s, tasks_for(s->count, TASK));
+        trip_run_tasks(&s->runner, blend_batch, s, tasks_for((size_t)s->camera.height, STRIP));
+    }
+    s->stats.blend_ns += trip_now_ns() - began;
+    return 0;
+}
+
+static void divide_strip(void *context, unsigned strip)
+{
+    trip_surfels_cpu *s = context;
+    const size_t per_strip = (size_t)STRIP * (size_t)s->camera.width, begin = strip * per_strip;
+    for (size_t i = begin; i < begin + per_strip && i < s->pixels; i++)
+        divide(&s->sums[i]);
 }
 
 void trip_surfels_cpu_each_visible(const trip_surfels_cpu *s,
@@ -540,7 +584,8 @@ void trip_surfels_cpu_picture(trip_surfels_cpu *s, float *rgba, float *depth)
     const uint64_t began = trip_now_ns();
     picture p = { s, rgba, s->settings.depth ? depth : NULL };
     trip_run_tasks(&s->runner, bound_row, s, (unsigned)s->cell_rows);
-    trip_run_tasks(&s->runner, blend_strip, s, tasks_for((size_t)s->camera.height, STRIP));
+    trip_run_tasks(&s->runner, s->unselected ? divide_strip : blend_strip, s,
+                   tasks_for((size_t)s->camera.height, STRIP));
     trip_run_tasks(&s->runner, write_row, &p, (unsigned)s->camera.height);
     s->stats.visible = 0;
     for (int row = 0; row < s->cell_rows; row++)

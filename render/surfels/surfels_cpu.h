@@ -24,6 +24,9 @@ typedef struct trip_surfels_cpu_params {
     const trip_gaussian_settings *settings; /* copied, but not the light */
     trip_budget *budget;
     const trip_task_runner *runner; /* NULL for no threads */
+    /* Without selection: all surfels are blended, as in section 3 of the paper. Only for
+     * comparisons of time. No surfel is skipped, and the sums depend on the order. */
+    bool unselected;
 } trip_surfels_cpu_params;
 
 typedef struct trip_surfels_cpu_stats {
@@ -48,6 +51,11 @@ int trip_surfels_cpu_add(trip_surfels_cpu *s, const trip_gaussian *surfels, size
                          uint32_t first);
 int trip_surfels_cpu_add_from(trip_surfels_cpu *s, trip_surfel_getter *get, const void *context,
                               size_t count);
+
+/* Without selection: blends surfels. All surfels must be added before the first call, and are
+ * blended once. */
+int trip_surfels_cpu_blend_from(trip_surfels_cpu *s, trip_surfel_getter *get, const void *context,
+                                size_t count);
 
 /* Returns whether surfels change nothing: they reach up to a rectangle, in pixels, and lie behind
  * `depth`, together with their tolerances. The rectangle may exceed the picture. */
