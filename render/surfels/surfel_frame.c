@@ -37,7 +37,7 @@ struct trip_surfel_frame {
     size_t buffer_records, record_bytes;
     part parts[BATCH_BRICKS];
     unsigned part_count;
-    bool kept; /* the history is that of this picture */
+    bool kept; /* this picture has replaced the history */
     trip_surfel_frame_stats stats;
 };
 

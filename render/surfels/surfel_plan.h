@@ -1,5 +1,5 @@
-/* The bricks that a deferred picture may read: those of the level of detail that meet the view, in
- * the order in which they are read. The order changes no bit of the picture (surfel_picture.h), but
+/* The bricks that a deferred picture may read, in the order of reading. They belong to the level of
+ * detail and meet the view. The order changes no bit of the picture (surfel_picture.h), but
  * bricks read early may hide later ones. */
 #ifndef TRIP_SURFEL_PLAN_H
 #define TRIP_SURFEL_PLAN_H
@@ -31,7 +31,7 @@ typedef struct trip_surfel_brick {
 typedef struct trip_surfel_plan {
     const trip_placed_set *sets;
     trip_surfel_brick *bricks; /* by ascending numbers */
-    trip_key *order;           /* the numbers of these, in the order of reading */
+    trip_key *order;           /* `number` is an index of bricks; in the order of reading */
     size_t count;
     uint64_t records, coarse_records;
     uint64_t outside_records; /* of bricks that do not meet the view, of sets that do */

@@ -37,7 +37,7 @@ typedef struct trip_surfels_cpu_stats {
     uint64_t project_ns, blend_ns;
 } trip_surfels_cpu_stats;
 
-/* Begins a picture. It takes about 110 bytes per pixel and up to 3 MB for a batch. Fails (reported)
+/* Begins a picture. It takes about 120 bytes per pixel and up to 3 MB for a batch. Fails (reported)
  * if the budget refuses that. */
 int trip_surfels_cpu_begin(trip_surfels_cpu **out, const trip_surfels_cpu_params *params);
 void trip_surfels_cpu_end(trip_surfels_cpu *s); /* NULL is allowed */
