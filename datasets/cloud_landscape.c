@@ -1,4 +1,4 @@
-#include "landscape_cells.h"
+#include "landscape.h"
 
 #include <math.h>
 #include <stdbool.h>

@@ -1,4 +1,4 @@
-#include "landscape_cells.h"
+#include "landscape.h"
 
 #include <limits.h>
 #include <math.h>
