@@ -126,6 +126,26 @@ class Deferred(program.ProgramTest):
                            "0,1,0", "--fov", "40")["frames"][0]["surfels"]
         self.assertEqual((aside["objects_in_view"], aside["planned"]), (0, 0))
 
+    def test_bench_measures_the_selection(self):
+        at, normal = ball(300)
+        coloured("ball.ply", at, (90, 160, 20), nx=normal[:, 0], ny=normal[:, 1], nz=normal[:, 2])
+        self.works("brick", "ball.ply", "-o", "ball.trip", "-q")
+        tables = json.loads(self.works("bench", "surfels", "ball.trip", "--repeat", "1", "--size", "64",
+                                       "--json").stdout)["tables"]
+        rows = {r["scene"]: r for r in tables["selection"]["rows"]}
+        self.assertEqual([rows[n]["objects"] for n in ("single", "dynamic", "forest")], [1, 200, 6800])
+        self.assertEqual(rows["single"]["surfels"], 300)
+        # half of a ball is hidden, and pixels hold several points
+        self.assertTrue(0.5 < rows["single"]["culled"] < 0.95)
+        for r in tables["selection"]["rows"]:
+            self.assertAlmostEqual(r["speedup"], r["fps"] / r["without_fps"], places=6)
+        reads = {(r["scene"], r["selection"]): r["bytes"] for r in tables["passes"]["rows"]}
+        self.assertGreaterEqual(reads["single", "without"], 2 * 24 * 300)
+        self.fails(2, "bench", "surfels", says="made of a cloud of points")
+        donut = os.path.join(program.DATASETS, "donut_slice.ply")
+        self.works("brick", donut, "-o", "donut.trip", "-q")
+        self.fails(2, "bench", "surfels", "donut.trip", says="is no cloud of surfels")
+
     def test_what_does_not_apply_is_refused(self):
         coloured("a.ply", grid(9), (1, 2, 3))
         for options, says in ((("--kernel", "exact"), "does not apply to --order deferred"),

@@ -672,7 +672,7 @@ class Gaussians(program.ProgramTest):
 
     def test_commands_for_volumes_refuse_scenes(self):
         data = self.scene("refused", [row((0, 0, 0))])
-        self.leaves_nothing(2, "bench", "stream", data, says="only the tables orders and flight measure it")
+        self.leaves_nothing(2, "bench", "stream", data, says="only the tables orders and flight measure it, and")
         self.leaves_nothing(2, "bench", "orders", data, "--tf", "bone", says="is a Gaussian scene")
         self.leaves_nothing(2, "bench", "orders", data, "--no-shading", says="is a Gaussian scene")
         self.leaves_nothing(2, "bench", "orders", data, "--renderer", "reference", says="must be cpu")

@@ -512,7 +512,7 @@ class Options(program.ProgramTest):
             run = self.fails(2, *arguments, says=says[0])
             for more in says[1:]:
                 self.assertIn(more, run.stderr)
-            self.assertLess(len(run.stderr), 160, run.stderr)
+            self.assertLess(len(run.stderr), 180, run.stderr)
         self.assertNotIn("did you mean", self.fails(2, *render, "--frobnicate").stderr)
         self.fails(1, *render, "--tf=ct-bnoe", says="did you mean preset:ct-bone?")
         self.fails(1, *render, "--tf=unlike-any", says="no such file or preset; `triptych tf list`")

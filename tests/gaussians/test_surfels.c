@@ -30,6 +30,7 @@ typedef struct way {
     size_t batch;
     bool backwards; /* the last batch comes first */
     uint64_t memory_bytes;
+    bool unselected;
 } way;
 
 typedef struct drawn {
@@ -47,6 +48,12 @@ static void add_all(trip_surfels_cpu *s, const trip_gaussian *surfels, size_t co
     }
 }
 
+static uint32_t get(const void *context, size_t i, trip_gaussian *out)
+{
+    *out = ((const trip_gaussian *)context)[i];
+    return (uint32_t)i;
+}
+
 static void draw(drawn *out, const trip_camera *c, const trip_gaussian_settings *settings,
                  const trip_gaussian *surfels, size_t count, way w)
 {
@@ -56,11 +63,15 @@ static void draw(drawn *out, const trip_camera *c, const trip_gaussian_settings 
     assert_int_equal(trip_budget_create(&budget, w.memory_bytes ? w.memory_bytes : 64u << 20), 0);
     assert_int_equal(trip_cpu_pool_create(&pool, w.threads ? w.threads : 1), 0);
     const trip_task_runner runner = { run_all, pool };
-    const trip_surfels_cpu_params params = {
-        .camera = c, .settings = settings, .budget = budget, .runner = &runner
-    };
+    const trip_surfels_cpu_params params = { .camera = c,
+                                             .settings = settings,
+                                             .budget = budget,
+                                             .runner = &runner,
+                                             .unselected = w.unselected };
     assert_int_equal(trip_surfels_cpu_begin(&s, &params), 0);
     add_all(s, surfels, count, w);
+    if (w.unselected)
+        assert_int_equal(trip_surfels_cpu_blend_from(s, get, surfels, count), 0);
     trip_surfels_cpu_picture(s, out->rgba, settings->depth ? out->depth : NULL);
     out->stats = trip_surfels_cpu_get_stats(s);
     trip_surfels_cpu_end(s);
@@ -376,6 +387,23 @@ static void order_and_batches_change_no_bit(void **state)
     expect_same((way){ .batch = 700, .backwards = true, .threads = 3 });
 }
 
+/* Where each surfel has a pixel of its own and none is hidden, selection leaves none out. */
+static void selection_keeps_all_surfels_that_can_be_told_apart(void **state)
+{
+    (void)state;
+    const trip_camera c = camera_of(0);
+    plane_at(surfels, 5, 0.3, 0.4);
+    for (int k = 0; k < SIDE * SIDE; k++)
+        colour(&surfels[k], test_random(), test_random(), test_random());
+    draw(&one, &c, &plain, surfels, SIDE * SIDE, (way){ .threads = 2 });
+    draw(&other, &c, &plain, surfels, SIDE * SIDE, (way){ .threads = 2, .unselected = true });
+    assert_true(one.stats.visible > 100);
+    assert_true(other.stats.hidden == 0);
+    for (int i = 0; i < 4 * PIXELS; i++)
+        assert_close((double)one.rgba[i], (double)other.rgba[i], 1e-4);
+    assert_memory_equal(one.depth, other.depth, sizeof one.depth);
+}
+
 /* Two scans of a surface, with noise about as large as the tolerance. */
 static void hidden_surfels_of_noisy_scans_change_no_bit(void **state)
 {
@@ -459,6 +487,7 @@ int main(void)
         cmocka_unit_test(cpu_draws_the_reference),
         cmocka_unit_test(threads_change_no_bit),
         cmocka_unit_test(order_and_batches_change_no_bit),
+        cmocka_unit_test(selection_keeps_all_surfels_that_can_be_told_apart),
         cmocka_unit_test(hidden_surfels_of_noisy_scans_change_no_bit),
         cmocka_unit_test(memory_changes_no_bit),
         cmocka_unit_test(hidden_rectangles_are_told),
