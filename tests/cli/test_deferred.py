@@ -2,12 +2,16 @@
 depend neither on memory, threads, earlier pictures nor on what is hidden. Expected colours are
 closed forms."""
 import json
+import math
 import os
+import sys
 import unittest
 
 import numpy
 
-import program
+sys.path.append(os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "gaussians"))
+import discs  # noqa: E402
+import program  # noqa: E402
 from test_points import grid, write_cloud
 
 VIEW = ("--size", "160x120", "--eye", "0,0,8", "--look", "0,0,0", "--up", "0,1,0", "--fov", "30")
@@ -30,6 +34,24 @@ class Deferred(program.ProgramTest):
     def write_json(self, path, value):
         program.write(path, json.dumps(value).encode())
         return path
+
+    def test_a_scan_is_close_to_cast_discs(self):
+        """The ray caster of discs.py shows the nearest disc of each ray. Disc radii come from its own
+        search for neighbours. Few pixels lie more than a pixel beyond the other silhouette."""
+        lamp = os.path.join(program.DATASETS, "lamp.ply")
+        cloud = discs.shape(discs.read_ply(lamp))
+        lo, hi = numpy.percentile(cloud["centre"], [2, 98], axis=0)
+        middle, size = (lo + hi) / 2, numpy.linalg.norm(hi - lo)
+        for turn, bound in (0.3, 2.5), (-0.6, 2.5):
+            eye = middle + size * numpy.array([math.sin(turn), 0.2, math.cos(turn)])
+            view = {"eye": eye, "look": middle, "up": numpy.array([0.0, 1, 0]), "fov": 40, "size": (240, 240)}
+            options = [f"--{k}={','.join(map(repr, map(float, view[k])))}" for k in ("eye", "look", "up")]
+            picture = self.picture(lamp, *options, "--fov", "40", "--size", "240x240", "--background",
+                                   "transparent")
+            apart = discs.compare(picture, discs.draw(cloud, view, 3))
+            self.assertLess(apart["colour"], bound, apart)
+            self.assertLess(apart["differing"], 0.03, apart)
+            self.assertLess(apart["beyond"], 30, apart)  # of 57,600 pixels
 
     def test_overlapping_scans_of_one_wall_have_the_mean_colour(self):
         """Two scans of a wall lie closer than a radius, with noise. Neither hides the other in
