@@ -639,7 +639,7 @@ typedef enum triptych_order {
      * the sheets that it reaches. The order inside a sheet does not matter. The picture comes close
      * to the integral of overlapping Gaussians. Not with GL. */
     TRIPTYCH_ORDER_SHEETS,
-    /* None: only the nearest surfels of a cloud are drawn, and blended at each pixel. For clouds of
+    /* Draws only the nearest surfels of a cloud, and blends them at each pixel. For clouds of
      * points alone. Not with GL. An opacity factor below 1 makes the whole cloud translucent. */
     TRIPTYCH_ORDER_DEFERRED,
 } triptych_order;
@@ -877,8 +877,8 @@ typedef struct triptych_frame_stats {
     unsigned trials;      /* made by this context */
     int choice_waits;     /* 1 if the frame has the defaults until triptych_choose() */
     triptych_order order; /* of Gaussians, as drawn; TRIPTYCH_ORDER_DEFAULT for volumes */
-    /* Of deferred pictures. The surfels of bricks in view, and of these: in bricks that were not
-     * read since they were hidden; read, but outside the picture; read, but hidden; and visible. */
+    /* Deferred pictures count the surfels of the bricks in view. Unread ones are in hidden bricks.
+     * The others were read. They lie outside the picture, or are hidden, or are visible. */
     uint64_t surfels_planned, surfels_unread, surfels_outside, surfels_hidden, surfels_visible;
     unsigned objects_in_view;
 } triptych_frame_stats;

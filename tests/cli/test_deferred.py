@@ -133,6 +133,22 @@ class Deferred(program.ProgramTest):
             self.assertTrue((alone[far < radius - 2, 3] > 0.999).all())
             self.assertTrue((alone[far > radius + 2.5, 3] == 0).all())
 
+    def test_levels_keep_a_fine_texture_from_aliasing(self):
+        """Figure 4 of Guennebaud et al. 2004: a checkerboard with squares far below a pixel is grey.
+        The selected surfels alone would be black or white."""
+        points = grid(400, 0.01)
+        i, k = numpy.divmod(numpy.arange(len(points)), 400)
+        value = 255 * ((i // 2 + k // 2) % 2)
+        n = len(points)
+        write_cloud("board.ply", points, red=value, green=value, blue=value, nx=[0] * n, ny=[0] * n,
+                    nz=[1] * n)
+        view = ("--size", "60x60", "--eye", "0,0,9", "--look", "0,0,0", "--up", "0,1,0", "--ortho", "5")
+        fine, coarse = (255 * self.picture("board.ply", *view, "--lod", lod)[10:-10, 10:-10, 0]
+                        for lod in ("0", "1"))
+        self.assertLess(abs(coarse.mean() - 127.5), 4)
+        self.assertLess(coarse.std(), 12)
+        self.assertGreater(fine.std(), 3 * coarse.std())
+
     def test_instances_count_once_each(self):
         """A row of balls. The first one hides the others, which are smaller."""
         at, normal = ball(5000, 0.5)
