@@ -441,6 +441,7 @@ static int order_spool(bricker *b)
     int status = make_output(b, &b->ordered);
     if (status == TRIP_OK)
         status = trip_gaussian_sort(&(trip_gaussian_sort_params){ .spool = &b->spool,
+                                                                  .closes = &b->spool,
                                                                   .records = b->records,
                                                                   .degree = b->p->degree,
                                                                   .folder = b->folder,

@@ -31,6 +31,9 @@ double trip_dilogarithm(double x)
     return sum;
 }
 
+/* pow(1.0 / 3, 1 / 1.6075) */
+#define DISC_AREA 0.50488272394865408
+
 /* Knud Thomsen's formula for the surface of an ellipsoid. Its error is at most 1.1 %. */
 double trip_gaussian_mean_area(const double s[3])
 {
@@ -38,6 +41,8 @@ double trip_gaussian_mean_area(const double s[3])
     const double most = fmax(s[0], fmax(s[1], s[2]));
     if (!(most > 0))
         return 0;
+    if (s[0] == s[1] && s[2] == 0)
+        return most * most * DISC_AREA;
     const double x = s[0] / most, y = s[1] / most, z = s[2] / most;
     return most * most * pow((pow(x * y, p) + pow(x * z, p) + pow(y * z, p)) / 3, 1 / p);
 }

@@ -162,9 +162,11 @@ static int make_runs(sorter *s)
 {
     int status = TRIP_OK;
     if (s->slices > 1)
-        return trip_workers_run(s->p->workers, make_run, s, s->run_count);
-    for (uint64_t i = 0; i < s->run_count && status == TRIP_OK; i++)
+        status = trip_workers_run(s->p->workers, make_run, s, s->run_count);
+    for (uint64_t i = 0; i < s->run_count && s->slices == 1 && status == TRIP_OK; i++)
         status = make_run(s, 0, i);
+    if (s->p->closes)
+        trip_output_close(s->p->closes);
     return status;
 }
 

@@ -20,6 +20,7 @@ size_t trip_spilled_bytes(int degree);
 
 typedef struct trip_gaussian_sort_params {
     const trip_output *spool; /* the splats, flushed */
+    trip_output *closes;      /* the spool, if it is closed before the first emit; or NULL */
     trip_workers *workers;    /* no loop runs */
     uint64_t first;           /* splat of the spool that is sorted */
     uint64_t records;

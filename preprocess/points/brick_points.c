@@ -17,7 +17,7 @@
 enum {
     BATCH = 512,
     SPOOL_BYTES = 1 << 17,
-    TILES_PER_THREAD = 4, /* tiles that are worked on at once */
+    TILES_PER_THREAD = 2, /* of a loop */
     TELL_EVERY = 1 << 14,
     PASSES = 8, /* over the cloud: read, sort, and six of trip_brick_gaussians() */
 };
@@ -34,6 +34,7 @@ typedef struct bricker {
     trip_output spool;
     uint64_t records, left_out, passed;
     bool lacking; /* a radius or a normal */
+    bool ordered; /* rows come in the order of the octree */
     trip_gaussian_sample sample;
     double *values; /* of the sample */
     size_t sample_bytes, values_bytes;
@@ -45,12 +46,18 @@ typedef struct bricker {
     trip_octree octree;
     trip_point_tiles *tiles;
     trip_workers *workers;
-    trip_point_row *rows;  /* of the tiles from first_tile on, TRIP_POINT_TILE_MAX each */
-    unsigned rooms, ready; /* tiles that fit, and that are finished */
-    uint64_t next_tile;
-    unsigned tile; /* of the ready ones that is given out, and its row */
-    uint32_t row;
-    uint64_t given; /* rows of the spool, without tiles */
+    /* Rows of tiles, TRIP_POINT_TILE_MAX each. A loop completes one half while the other half is
+     * given out. */
+    trip_point_row *rows;
+    unsigned rooms;           /* of a half */
+    unsigned half;            /* that is given out: 0 or 1 */
+    uint64_t next_tile;       /* its first tile */
+    unsigned ready, tile;     /* its tiles, and the one that is given out */
+    uint32_t row;             /* of this tile */
+    uint64_t loop_tile;       /* first tile of the loop */
+    unsigned loop_tiles;      /* 0: no loop runs */
+    trip_point_row *loop_row; /* of the first tile */
+    uint64_t given;           /* rows of the spool, without tiles */
     /* Mean and sum of squares of the spreads, and the greatest spread that is kept. */
     double spread_mean, spread_squares, spread_max;
     uint64_t outliers;
@@ -272,7 +279,8 @@ static bool has_normal(const trip_point_row *row)
 static void complete_row(const bricker *b, const trip_neighbours *n, trip_point_row *row)
 {
     double towards[3];
-    row->spread = (float)trip_surfel_spread(n);
+    if (completes_first(b))
+        row->spread = (float)trip_surfel_spread(n);
     if (has_late_values(b))
         set_value(row, log10(trip_surfel_density(n)));
     if (has_normal(row) && row->radius > 0)
@@ -292,8 +300,8 @@ static void complete_row(const bricker *b, const trip_neighbours *n, trip_point_
 static int complete_tile(void *user, unsigned thread, uint64_t item)
 {
     bricker *b = user;
-    const uint64_t tile = b->next_tile + item;
-    trip_point_row *rows = b->rows + item * TRIP_POINT_TILE_MAX;
+    const uint64_t tile = b->loop_tile + item;
+    trip_point_row *rows = b->loop_row + item * TRIP_POINT_TILE_MAX;
     const uint32_t count = trip_point_tiles_at(b->tiles, tile)->count;
     trip_neighbours n = { .count = 0 };
     const unsigned wanted = b->p->neighbours ? b->p->neighbours : TRIP_POINT_NEIGHBOURS;
@@ -319,7 +327,7 @@ static void note_sorted(void *user, uint64_t rows)
 
 static size_t rows_bytes(const bricker *b)
 {
-    return (size_t)b->rooms * TRIP_POINT_TILE_MAX * sizeof *b->rows;
+    return 2 * (size_t)b->rooms * TRIP_POINT_TILE_MAX * sizeof *b->rows;
 }
 
 static int prepare_tiles(bricker *b)
@@ -340,27 +348,52 @@ static int prepare_tiles(bricker *b)
         status = trip_point_tiles_make(&b->tiles, &params, b->budget);
     if (status < 0)
         return status;
+    b->ordered = true;
     b->rooms = TILES_PER_THREAD * trip_workers_count(b->workers);
     b->rows = trip_budget_take(b->budget, rows_bytes(b));
     return b->rows ? trip_point_tiles_begin_searches(b->tiles, trip_workers_count(b->workers))
                    : fail_memory(b);
 }
 
+static trip_point_row *rows_of(const bricker *b, unsigned half, unsigned tile)
+{
+    return b->rows + ((size_t)half * b->rooms + tile) * TRIP_POINT_TILE_MAX;
+}
+
+/* Starts a loop over the tiles from `first` on, in the half that is not given out. */
+static void start_loop(bricker *b, uint64_t first)
+{
+    const uint64_t left = trip_point_tiles_count(b->tiles) - first;
+    b->loop_tile = first;
+    b->loop_tiles = left < b->rooms ? (unsigned)left : b->rooms;
+    b->loop_row = rows_of(b, 1 - b->half, 0);
+    if (b->loop_tiles)
+        trip_workers_start(b->workers, complete_tile, b, b->loop_tiles);
+}
+
 /* Completes the tiles that come next. */
 static int complete_tiles(bricker *b)
 {
-    b->next_tile += b->ready;
-    const uint64_t left = trip_point_tiles_count(b->tiles) - b->next_tile;
-    b->ready = left < b->rooms ? (unsigned)left : b->rooms;
+    int status = 0;
     b->tile = 0;
     b->row = 0;
-    return trip_workers_run(b->workers, complete_tile, b, b->ready);
+    b->next_tile += b->ready;
+    if (!b->loop_tiles)
+        start_loop(b, b->next_tile);
+    b->ready = b->loop_tiles;
+    if (b->ready)
+        trip_workers_wait(b->workers, 0, &status);
+    b->half = 1 - b->half;
+    b->loop_tiles = 0;
+    if (status == 0 && b->ready)
+        start_loop(b, b->next_tile + b->ready);
+    return status;
 }
 
 static void release_tiles(bricker *b)
 {
+    trip_workers_destroy(b->workers); /* ends the loop */
     trip_point_tiles_free(b->tiles);
-    trip_workers_destroy(b->workers);
     if (b->rows)
         trip_budget_release(b->budget, b->rows, rows_bytes(b));
     b->tiles = NULL;
@@ -386,7 +419,7 @@ static int spool_tiles(bricker *b, trip_output *rows)
     int status = complete_tiles(b);
     while (status == 0 && b->ready > 0) {
         for (unsigned t = 0; t < b->ready && status == 0; t++) {
-            const trip_point_row *from = &b->rows[(size_t)t * TRIP_POINT_TILE_MAX];
+            const trip_point_row *from = rows_of(b, b->half, t);
             const uint32_t count = trip_point_tiles_at(b->tiles, b->next_tile + t)->count;
             for (uint32_t i = 0; i < count; i++)
                 note_row(b, &from[i], ++number);
@@ -486,7 +519,7 @@ static int next_of_tiles(bricker *b, trip_gaussian *out, size_t room, size_t *go
                 return status;
         }
         const uint64_t tile = b->next_tile + b->tile;
-        make_surfel(b, &b->rows[(size_t)b->tile * TRIP_POINT_TILE_MAX + b->row], &out[(*got)++]);
+        make_surfel(b, rows_of(b, b->half, b->tile) + b->row, &out[(*got)++]);
         if (++b->row == trip_point_tiles_at(b->tiles, tile)->count) {
             b->row = 0;
             b->tile++;
@@ -518,11 +551,13 @@ static int give_surfels(void *user, trip_gaussian *out, size_t room, size_t *got
 {
     bricker *b = user;
     *got = 0;
-    if (!b->lacking)
-        return next_of_spool(b, out, room, got);
-    const int status = b->tiles ? next_of_tiles(b, out, room, got) : 0;
-    if (status == 0 && *got == 0)
-        release_tiles(b); /* the sorts that follow need the memory */
+    const int status = !b->lacking ? next_of_spool(b, out, room, got)
+                       : b->tiles  ? next_of_tiles(b, out, room, got)
+                                   : 0;
+    if (status == 0 && *got == 0) {
+        release_tiles(b); /* what follows needs the memory and the disk */
+        trip_output_close(&b->spool);
+    }
     return status;
 }
 
@@ -548,8 +583,8 @@ static int brick_surfels(bricker *b, trip_brick_gaussians_result *result)
             .source = give_surfels,
             .source_user = b,
             .source_name = p->file_name,
-            .octree = b->lacking ? &b->octree : NULL,
-            .octree_records = b->lacking ? b->records : 0,
+            .octree = b->ordered ? &b->octree : NULL,
+            .octree_records = b->ordered ? b->records : 0,
             .flags = p->flags | TRIP_GAUSSIAN_FLAT | TRIP_GAUSSIAN_CLOUD |
                      (p->colouring == TRIP_POINT_BY_RGB ? 0 : TRIP_GAUSSIAN_SHADED),
             .text = p->text,

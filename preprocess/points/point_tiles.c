@@ -175,6 +175,7 @@ static int sort(trip_point_tiles *t)
         status = add_room(t);
     if (status == 0)
         status = trip_gaussian_sort(&(trip_gaussian_sort_params){ .spool = p->spool,
+                                                                  .closes = p->spool,
                                                                   .workers = p->workers,
                                                                   .records = p->records,
                                                                   .place = place_row,

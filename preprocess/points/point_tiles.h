@@ -38,8 +38,8 @@ typedef struct trip_point_tile {
 typedef struct trip_point_tiles trip_point_tiles;
 
 typedef struct trip_point_tiles_params {
-    const trip_output *spool; /* of trip_point_row, flushed */
-    trip_workers *workers;    /* no loop runs */
+    trip_output *spool;    /* of trip_point_row, flushed; it is closed once it is read */
+    trip_workers *workers; /* no loop runs */
     uint64_t records;
     const trip_octree *octree; /* of the positions; it must outlive the tiles */
     const char *folder;        /* for temporary files */

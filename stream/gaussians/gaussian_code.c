@@ -58,19 +58,20 @@ static uint64_t code_of(double value, double lo, double hi, unsigned max)
     return hi > lo ? (uint64_t)(lowest((value - lo) / (hi - lo), 0, 1) * max + 0.5) : 0;
 }
 
-static trip_gaussian fetch(const unsigned char *splat, int degree)
-{
-    trip_gaussian g = { .opacity = 0 };
-    memcpy(&g, splat, offsetof(trip_gaussian, sh) + (size_t)trip_sh_count(degree) * sizeof g.sh[0]);
-    return g;
-}
-
+/* Conditions are faster than fmin() and fmax() here. All values are finite. */
 static void include(double lo[3], double hi[3], const double at[3], const double half[3])
 {
     for (int a = 0; a < 3; a++) {
-        lo[a] = fmin(lo[a], at[a] - half[a]);
-        hi[a] = fmax(hi[a], at[a] + half[a]);
+        const double below = at[a] - half[a], above = at[a] + half[a];
+        lo[a] = below < lo[a] ? below : lo[a];
+        hi[a] = above > hi[a] ? above : hi[a];
     }
+}
+
+static void include_value(float *lo, float *hi, float value)
+{
+    *lo = value < *lo ? value : *lo;
+    *hi = value > *hi ? value : *hi;
 }
 
 static unsigned char *pack_harmonics(float largest, const float sh[TRIP_SH_MAX][3], int n,
@@ -126,28 +127,27 @@ static void find_ranges(trip_file_gaussian_brick *b, const unsigned char *const 
                         unsigned count, int degree)
 {
     const double none[3] = { 0 };
-    double log_lo = INFINITY, log_hi = -INFINITY;
+    float least = INFINITY, most = 0;
     for (int c = 0; c < 3; c++) {
         b->centre_lo[c] = INFINITY, b->centre_hi[c] = -INFINITY;
         b->colour_lo[c] = INFINITY, b->colour_hi[c] = -INFINITY;
         b->scale[c] = 0;
     }
     for (unsigned i = 0; i < count; i++) {
-        const trip_gaussian g = fetch(splats[i], degree);
-        include(b->centre_lo, b->centre_hi, g.centre, none);
+        const trip_gaussian *g = (const void *)splats[i];
+        include(b->centre_lo, b->centre_hi, g->centre, none);
         for (int c = 0; c < 3; c++) {
-            b->colour_lo[c] = fminf(b->colour_lo[c], g.sh[0][c]);
-            b->colour_hi[c] = fmaxf(b->colour_hi[c], g.sh[0][c]);
-            if (g.deviations[c] > 0) {
-                log_lo = fmin(log_lo, log((double)g.deviations[c]));
-                log_hi = fmax(log_hi, log((double)g.deviations[c]));
-            }
+            include_value(&b->colour_lo[c], &b->colour_hi[c], g->sh[0][c]);
+            if (g->deviations[c] > 0)
+                include_value(&least, &most, g->deviations[c]);
         }
         for (int n = 1; n <= degree; n++)
-            b->scale[n - 1] = fmaxf(b->scale[n - 1], largest_of(g.sh, n));
+            b->scale[n - 1] = fmaxf(b->scale[n - 1], largest_of(g->sh, n));
     }
-    b->log_hi = log_hi >= log_lo ? (float)log_hi : 0;
-    b->log_lo = log_hi >= log_lo ? (float)fmax(log_lo, log_hi - LOG_RANGE) : 0;
+    const double log_hi = most > 0 ? log((double)most) : 0;
+    const double log_lo = most > 0 ? fmax(log((double)least), log_hi - LOG_RANGE) : 0;
+    b->log_hi = (float)log_hi;
+    b->log_lo = (float)log_lo;
     if (b->log_lo > b->log_hi)
         b->log_lo = b->log_hi;
 }
@@ -187,10 +187,13 @@ static uint64_t colour_code(const trip_file_gaussian_brick *b, const trip_gaussi
 static words pack(const trip_file_gaussian_brick *b, const trip_gaussian *g)
 {
     words r = { { 0 } };
+    uint64_t code = 0; /* of the last deviation; often the next one has it too */
     for (int a = 0; a < 3; a++) {
         r.w[0] |= code_of(g->centre[a], b->centre_lo[a], b->centre_hi[a], CENTRE_MAX)
                   << CENTRE_BITS * a;
-        r.w[2] |= deviation_code(b, g->deviations[a]) << 12 * a;
+        if (a == 0 || g->deviations[a] != g->deviations[a - 1])
+            code = deviation_code(b, g->deviations[a]);
+        r.w[2] |= code << 12 * a;
     }
     r.w[1] = rotation_code(g->rotation) | code_of((double)g->opacity, 0, 1, OPACITY_MAX) << 38 |
              colour_code(b, g, 0) << 50;
@@ -215,45 +218,6 @@ void trip_gaussian_half_extents(const trip_gaussian *g, double half[3])
         }
         half[a] = TRIP_GAUSSIAN_REACH * sqrt(sum);
     }
-}
-
-/* Finds the bounds of the decoded records, since a reader draws them. */
-static void find_reach(trip_file_gaussian_brick *b, const unsigned char *records, unsigned count)
-{
-    b->opacity_max = 0;
-    for (int a = 0; a < 3; a++)
-        b->reach_lo[a] = b->centre_lo[a], b->reach_hi[a] = b->centre_hi[a];
-    for (unsigned i = 0; i < count; i++) {
-        trip_gaussian g;
-        double half[3];
-        trip_gaussian_decode(b, records + (size_t)i * TRIP_GAUSSIAN_RECORD_BYTES, NULL, 0, &g);
-        trip_gaussian_half_extents(&g, half);
-        include(b->reach_lo, b->reach_hi, g.centre, half);
-        b->opacity_max = fmaxf(b->opacity_max, g.opacity);
-    }
-}
-
-void trip_gaussian_encode(trip_file_gaussian_brick *b, const trip_file_gaussian_header *h,
-                          const unsigned char *const *splats, unsigned count,
-                          unsigned char *const planes[])
-{
-    const int degree = (int)h->degree, own = h->flags & TRIP_GAUSSIAN_PALETTE ? 0 : degree;
-    const unsigned plane_count = trip_gaussian_plane_count(h, degree);
-    find_ranges(b, splats, count, own);
-    b->records = count;
-    for (unsigned i = 0; i < count; i++) {
-        const trip_gaussian g = fetch(splats[i], own);
-        const words r = pack(b, &g);
-        memcpy(planes[0] + i * sizeof r, &r, sizeof r);
-        for (int n = 1; n <= own; n++)
-            pack_harmonics(b->scale[n - 1], g.sh, n,
-                           planes[n] + i * trip_gaussian_plane_bytes(h, (unsigned)n));
-    }
-    find_reach(b, planes[0], count);
-    for (unsigned n = 0; n < TRIP_GAUSSIAN_PLANES; n++)
-        b->checksums[n] = n < plane_count
-                              ? XXH64(planes[n], count * (size_t)trip_gaussian_plane_bytes(h, n), 0)
-                              : 0;
 }
 
 /* Returns the value of a code, at most `hi` in spite of rounding. */
@@ -297,6 +261,60 @@ static void decode_rotation(uint64_t word, float rotation[4])
         rotation[i] = (float)(q[i] * scale);
 }
 
+static void decode_shape(const trip_file_gaussian_brick *b, words r, trip_gaussian *out)
+{
+    unsigned before = 0;
+    for (int a = 0; a < 3; a++) {
+        const unsigned code = bits(r.w[2], (unsigned)(12 * a), 12);
+        out->deviations[a] =
+            a > 0 && code == before ? out->deviations[a - 1] : decode_deviation(b, code);
+        before = code;
+    }
+    decode_rotation(r.w[1], out->rotation);
+    out->opacity = (float)bits(r.w[1], 38, 12) / OPACITY_MAX;
+}
+
+/* Finds the bounds of the decoded records, since a reader draws them. */
+static void find_reach(trip_file_gaussian_brick *b, const unsigned char *records, unsigned count)
+{
+    b->opacity_max = 0;
+    for (int a = 0; a < 3; a++)
+        b->reach_lo[a] = b->centre_lo[a], b->reach_hi[a] = b->centre_hi[a];
+    for (unsigned i = 0; i < count; i++) {
+        const unsigned char *record = records + (size_t)i * TRIP_GAUSSIAN_RECORD_BYTES;
+        trip_gaussian g;
+        double half[3];
+        trip_gaussian_decode_centre(b, record, g.centre);
+        decode_shape(b, load(record), &g);
+        trip_gaussian_half_extents(&g, half);
+        include(b->reach_lo, b->reach_hi, g.centre, half);
+        b->opacity_max = g.opacity > b->opacity_max ? g.opacity : b->opacity_max;
+    }
+}
+
+void trip_gaussian_encode(trip_file_gaussian_brick *b, const trip_file_gaussian_header *h,
+                          const unsigned char *const *splats, unsigned count,
+                          unsigned char *const planes[])
+{
+    const int degree = (int)h->degree, own = h->flags & TRIP_GAUSSIAN_PALETTE ? 0 : degree;
+    const unsigned plane_count = trip_gaussian_plane_count(h, degree);
+    find_ranges(b, splats, count, own);
+    b->records = count;
+    for (unsigned i = 0; i < count; i++) {
+        const trip_gaussian *g = (const void *)splats[i];
+        const words r = pack(b, g);
+        memcpy(planes[0] + i * sizeof r, &r, sizeof r);
+        for (int n = 1; n <= own; n++)
+            pack_harmonics(b->scale[n - 1], g->sh, n,
+                           planes[n] + i * trip_gaussian_plane_bytes(h, (unsigned)n));
+    }
+    find_reach(b, planes[0], count);
+    for (unsigned n = 0; n < TRIP_GAUSSIAN_PLANES; n++)
+        b->checksums[n] = n < plane_count
+                              ? XXH64(planes[n], count * (size_t)trip_gaussian_plane_bytes(h, n), 0)
+                              : 0;
+}
+
 static float decode_colour(const trip_file_gaussian_brick *b, unsigned code, int c)
 {
     return (float)value_of(code, (double)b->colour_lo[c], (double)b->colour_hi[c], COLOUR_MAX);
@@ -309,10 +327,7 @@ void trip_gaussian_decode(const trip_file_gaussian_brick *b, const unsigned char
     memset(out->sh, 0, sizeof out->sh);
     out->merged = out->antialiased = 0;
     trip_gaussian_decode_centre(b, record, out->centre);
-    for (int a = 0; a < 3; a++)
-        out->deviations[a] = decode_deviation(b, bits(r.w[2], (unsigned)(12 * a), 12));
-    decode_rotation(r.w[1], out->rotation);
-    out->opacity = (float)bits(r.w[1], 38, 12) / OPACITY_MAX;
+    decode_shape(b, r, out);
     out->sh[0][0] = decode_colour(b, bits(r.w[1], 50, 14), 0);
     out->sh[0][1] = decode_colour(b, bits(r.w[2], 36, 14), 1);
     out->sh[0][2] = decode_colour(b, bits(r.w[2], 50, 14), 2);
