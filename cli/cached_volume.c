@@ -58,9 +58,7 @@ int cached_volume_check_options(const char *input)
                : trip_fail(TRIP_USAGE, "usage", input,
                            "is a data set; --grid, --level-set, --spacing, --coordinates, --axes, "
                            "--series, --time, --channel, --allow-gaps, --fill, --color, --k, "
-                           "--outliers and "
-                           "--radius "
-                           "apply to files only");
+                           "--outliers, --radius and --uncertainty apply to files only");
 }
 
 /* Shows on a terminal that another process is bricking the same volume. */

@@ -17,7 +17,10 @@ typedef struct trip_gaussian {
      * their sum (gaussian_colour.h). Coefficients beyond the scene's degree are 0. */
     float sh[TRIP_SH_MAX][3];
     /* 1: trained with a compensated opacity, as trip_gaussian_settings.antialiased says of all. */
-    uint32_t antialiased;
+    uint16_t antialiased;
+    /* 1: the third axis points to the camera that saw it, and the opacity depends on the view
+     * (gaussian_picture.h). */
+    uint16_t from_camera;
     uint32_t merged; /* 1: of a coarse level, where it stands for Gaussians of the scene */
 } trip_gaussian;
 

@@ -96,15 +96,15 @@ _Static_assert((int)TRIPTYCH_POINT_COLOUR_AUTO == (int)TRIP_POINT_BY_AUTO &&
 static bool has_options(const triptych_brick_options *o)
 {
     return o->point_colour || o->point_neighbours || o->point_radius != 0 ||
-           o->point_radius_factor != 0 || o->point_outliers != 0;
+           o->point_radius_factor != 0 || o->point_outliers != 0 || o->point_uncertainty;
 }
 
 int trip_context_check_no_points(const char *path, const triptych_brick_options *o)
 {
     return has_options(o)
                ? trip_fail(TRIP_USAGE, "brick", path,
-                           "is no cloud of points; --color, --k, --radius and --outliers "
-                           "apply to clouds of points only")
+                           "is no cloud of points; --color, --k, --radius, --outliers and "
+                           "--uncertainty apply to clouds of points only")
                : 0;
 }
 
@@ -121,6 +121,9 @@ static const char *fault_of(const triptych_brick_options *o)
         return "the radius of points must be at least 0, up to 1e12, and its factor up to 1e6";
     if (!(o->point_outliers >= 0 && o->point_outliers <= 1000))
         return "outliers are points beyond 0 to 1000 deviations";
+    if (o->point_uncertainty && (o->point_neighbours || o->point_radius > 0))
+        return "the uncertainty of distances sets the shapes of points, so neighbours and a radius "
+               "do not apply: leave out --k, and give --radius a factor";
     if (o->axes && !trip_anatomy_axes_valid(o->axes))
         return "the axes must be three letters: one of R and L, one of A and P, one of S and I";
     return NULL;
@@ -130,8 +133,9 @@ int trip_context_describe_points_form(const char *path, const triptych_brick_opt
                                       char text[256])
 {
     const char *fault = fault_of(o);
-    snprintf(text, 256, "points %d %u %a %a %a %s\n", (int)o->point_colour, o->point_neighbours,
-             o->point_radius, o->point_radius_factor, o->point_outliers, o->axes ? o->axes : "");
+    snprintf(text, 256, "points %d %u %a %a %a %d %s\n", (int)o->point_colour, o->point_neighbours,
+             o->point_radius, o->point_radius_factor, o->point_outliers, o->point_uncertainty != 0,
+             o->axes ? o->axes : "");
     return fault ? trip_fail(TRIP_USAGE, "brick", path, "%s", fault) : 0;
 }
 
@@ -178,6 +182,7 @@ static int brick_file(triptych *t, trip_point_file *f, const char *path, const c
                                         .radius_factor = o->point_radius_factor,
                                         .outliers = o->point_outliers,
                                         .outliers_out = &out->outliers,
+                                        .uncertain = o->point_uncertainty != 0,
                                         .threads = trip_context_threads(o->threads),
                                         .progress = show_rows,
                                         .progress_user = t };
@@ -185,6 +190,11 @@ static int brick_file(triptych *t, trip_point_file *f, const char *path, const c
     int status = trip_point_choose_colouring(info, path, (trip_point_colouring)o->point_colour,
                                              &params.colouring);
     describe_surfels(info, out);
+    out->flat = !o->point_uncertainty;
+    if (status == 0 && o->point_uncertainty && !(info->attributes & TRIP_POINT_UNCERTAINTY))
+        status = trip_fail(TRIP_USAGE, "brick", path,
+                           "tells no uncertainty of its distances; --uncertainty applies to range "
+                           "images with poses");
     if (status == 0)
         status = find_up(info, path, o->axes, out->up);
     char *notes = status == 0 ? trip_context_scene_notes(path, out) : NULL;

@@ -394,7 +394,7 @@ static trip_gaussian_settings settings_of(const triptych *t)
         out.antialiased &= (t->placed[i].set->header.flags & TRIP_GAUSSIAN_ANTIALIASED) != 0;
     if (out.degree > degree_of(t))
         out.degree = degree_of(t);
-    if (!t->mixed && !t->levels) /* it comes behind everything */
+    if (!t->mixed && !t->levels && !t->given.all.normalise) /* it comes behind everything */
         memcpy(out.background, t->settings.background, sizeof out.background);
     return out;
 }

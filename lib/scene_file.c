@@ -11,6 +11,7 @@
 #include "gaussian_file.h"
 #include "json.h"
 #include "other_file.h"
+#include "point_file.h"
 #include "report.h"
 
 enum { BYTES_MAX = 16 << 20 };
@@ -36,7 +37,7 @@ bool trip_scene_file_is(const char *path)
     char text[TRIP_OTHER_TEXT_BYTES];
     struct stat st;
     if (length <= 5 || strcasecmp(path + length - 5, ".json") != 0 || stat(path, &st) < 0 ||
-        !S_ISREG(st.st_mode) || trip_gaussian_file_is(path))
+        !S_ISREG(st.st_mode) || trip_gaussian_file_is(path) || trip_point_file_is(path))
         return false;
     FILE *f = fopen(path, "re");
     const size_t got = f ? fread(head, 1, sizeof head, f) : 0;

@@ -267,7 +267,8 @@ TRIPTYCH_API int triptych_open_objects(triptych *t, const triptych_object *objec
  * to the Gaussians of each that the last frame drew; they last until the next frame. */
 TRIPTYCH_API unsigned triptych_get_objects(const triptych *t, const uint64_t **drawn);
 
-/* Returns 1 if the path names a scene file: a JSON file that places data sets. */
+/* Returns 1 if the path names a scene file: a JSON file that places data sets, and lists no range
+ * images. */
 TRIPTYCH_API int triptych_is_scene_file(const char *path);
 /* Reads a scene file. The path of an object is a named file, which may still need bricking. The
  * `name` of an object is NULL. triptych_free_objects() frees the objects. */

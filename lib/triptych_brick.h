@@ -155,6 +155,9 @@ typedef struct triptych_brick_options {
     /* Leaves out a point if the mean distance of its neighbours exceeds the mean over all points by
      * more than this many standard deviations, up to 1000. Default: keeps all points. */
     double point_outliers;
+    /* If not 0, samples of range images become ellipsoids with the uncertainty of their distance.
+     * Other clouds are refused. */
+    int point_uncertainty;
 
     /* ---- the opacity envelope: the union of the following; `automatic` if none is given ---- */
 

@@ -359,6 +359,10 @@ static const trip_option point_rows[] = {
       "all radii by F",
       "from the file, else from neighbours", .group = DRAW_GROUP_POINTS, AT(point_radius),
       CUSTOM(read_radius) },
+    { "uncertainty", NULL,
+      "Draws each sample of a range image as an ellipsoid along its ray, as "
+      "long as its distance is uncertain",
+      "surfels", .group = DRAW_GROUP_POINTS, .type = TRIP_OPTION_FLAG, AT(point_uncertainty) },
 };
 #undef AT
 

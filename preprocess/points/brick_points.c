@@ -9,6 +9,7 @@
 #include "folder.h"
 #include "gaussian_check.h"
 #include "gaussian_format.h"
+#include "point_ellipsoid.h"
 #include "point_tiles.h"
 #include "report.h"
 #include "surfel_shape.h"
@@ -129,6 +130,8 @@ static int spool_point(bricker *b, const trip_point *p)
     }
     memcpy(row.position, p->position, sizeof row.position);
     memcpy(row.normal, p->normal, sizeof row.normal);
+    if (b->p->uncertain)
+        trip_point_aim(&row, p, b->info->scans[p->scan].scanner);
     if (b->p->colouring == TRIP_POINT_BY_RGB)
         memcpy(row.colour, p->colour, sizeof row.colour);
     else
@@ -502,6 +505,8 @@ static void make_surfel(const bricker *b, const trip_point_row *row, trip_gaussi
     g->deviations[0] = g->deviations[1] = deviation;
     turn_to(row->normal, g->rotation);
     g->opacity = 1;
+    if (b->p->uncertain)
+        trip_point_stretch(g, row, factor, b->info->uncertainty);
     if (b->p->colouring == TRIP_POINT_BY_RGB)
         memcpy(rgb, row->colour, sizeof rgb);
     else
@@ -574,6 +579,8 @@ static void release_sample(bricker *b)
 static int brick_surfels(bricker *b, trip_brick_gaussians_result *result)
 {
     const trip_brick_points_params *p = b->p;
+    const uint32_t surfels = TRIP_GAUSSIAN_FLAT | TRIP_GAUSSIAN_CLOUD |
+                             (p->colouring == TRIP_POINT_BY_RGB ? 0 : TRIP_GAUSSIAN_SHADED);
     release_sample(b);
     b->passed += b->records;
     return trip_brick_gaussians(
@@ -583,10 +590,9 @@ static int brick_surfels(bricker *b, trip_brick_gaussians_result *result)
             .source = give_surfels,
             .source_user = b,
             .source_name = p->file_name,
-            .octree = b->ordered ? &b->octree : NULL,
-            .octree_records = b->ordered ? b->records : 0,
-            .flags = p->flags | TRIP_GAUSSIAN_FLAT | TRIP_GAUSSIAN_CLOUD |
-                     (p->colouring == TRIP_POINT_BY_RGB ? 0 : TRIP_GAUSSIAN_SHADED),
+            .octree = b->lacking ? &b->octree : NULL,
+            .octree_records = b->lacking ? b->records : 0,
+            .flags = p->flags | (p->uncertain ? TRIP_GAUSSIAN_FROM_CAMERA : surfels),
             .text = p->text,
             .threads = p->threads,
             .progress = tell,

@@ -18,7 +18,10 @@ typedef struct trip_point_row {
     trip_spilled head;
     double position[3];
     float deviations[3]; /* 0 */
-    float scan;
+    union {
+        float scan;
+        float uncertainty; /* of an ellipsoid, which has a normal */
+    };
     float normal[3]; /* 0, 0, 0: none */
     float radius;    /* 0: none */
     float colour[3]; /* or a value, which a palette colours */

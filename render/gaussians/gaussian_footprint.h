@@ -135,6 +135,21 @@ static inline double trip_gaussian_opacity(const trip_gaussian *g, const trip_ga
     return opacity;
 }
 
+/* Returns the direction of unit length in scene space that the colour belongs to. */
+static inline trip_vec3 trip_gaussian_direction(const trip_camera *c, const trip_gaussian *g)
+{
+    const trip_vec3 centre = trip_v3(g->centre[0], g->centre[1], g->centre[2]);
+    return trip_normalize(c->ortho ? c->r0 : trip_sub(centre, c->eye));
+}
+
+/* Returns the share of its opacity that a sample of a range image keeps. */
+static inline double trip_gaussian_facing(const trip_camera *c, const trip_gaussian *g)
+{
+    const double cosine = -trip_gaussian_to_axes(g, trip_gaussian_direction(c, g)).z;
+    const double square = cosine > 0 ? cosine * cosine : 0;
+    return square * square;
+}
+
 /* Sets the rows of the Jacobian at a footprint's position and depth. */
 static inline void trip_gaussian_jacobian(const trip_camera *c, trip_gaussian_shape shape,
                                           const trip_gaussian_footprint *f, trip_vec3 *jx,
@@ -177,6 +192,8 @@ static inline bool trip_gaussian_project(const trip_camera *c, const trip_gaussi
     const double bare = trip_dot(trip_cross(a, b), trip_cross(a, b)), add = TRIP_GAUSSIAN_LOW_PASS;
     const double filtered = bare + add * (xx + yy) + add * add;
     double opacity = trip_gaussian_opacity(g, s);
+    if (g->from_camera)
+        opacity *= trip_gaussian_facing(c, g);
     if (s->shape == TRIP_GAUSSIAN_EWA)
         opacity *= sqrt(bare / filtered);
     else if (s->antialiased || g->antialiased)
@@ -288,13 +305,6 @@ static inline bool trip_gaussian_box_bounds(const trip_camera *c, const double b
         hi[k] += reach + 1e-6;
     }
     return farthest > near;
-}
-
-/* Returns the direction of unit length in scene space that the colour belongs to. */
-static inline trip_vec3 trip_gaussian_direction(const trip_camera *c, const trip_gaussian *g)
-{
-    const trip_vec3 centre = trip_v3(g->centre[0], g->centre[1], g->centre[2]);
-    return trip_normalize(c->ortho ? c->r0 : trip_sub(centre, c->eye));
 }
 
 #endif

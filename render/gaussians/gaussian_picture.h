@@ -37,6 +37,10 @@
  * With the EWA footprint, J is not limited either, and m is sqrt(|J S J^T| / |S2|): the filter
  * keeps the footprint's mass.
  *
+ * A sample of a range image counts less from other directions than from its camera (Hofsetz and Max
+ * 2005, section 6). o' has the factor max(0, cos)^4 of the angle between two rays to the centre:
+ * from the eye and from the camera. Coarse Gaussians have no such factor.
+ *
  * A footprint that reaches TRIP_GAUSSIAN_REACH_MAX is left out.
  *
  * Compositing

@@ -36,7 +36,9 @@ enum trip_gaussian_flag {
     TRIP_GAUSSIAN_Z_UP = 16,       /* the scene's z axis points up; not with Y_DOWN */
     TRIP_GAUSSIAN_CLOUD = 32,      /* surfels of a cloud of points */
     TRIP_GAUSSIAN_SHADED = 64,     /* of a cloud: light shades its colours by default */
-    TRIP_GAUSSIAN_FLAGS = 127,
+    /* samples of range images: the third axis points to the camera */
+    TRIP_GAUSSIAN_FROM_CAMERA = 128,
+    TRIP_GAUSSIAN_FLAGS = 255,
 };
 
 typedef struct trip_file_gaussian_header {

@@ -318,6 +318,7 @@ static int read_part(const trip_placed_stream *s, part *p, trip_gaussian *out, d
     for (size_t i = 0; i < *got && !status; i++) {
         trip_gaussian_transform_apply(&set->placement, degree, &out[i]);
         out[i].antialiased = (h->flags & TRIP_GAUSSIAN_ANTIALIASED) != 0;
+        out[i].from_camera = h->flags & TRIP_GAUSSIAN_FROM_CAMERA && !out[i].merged;
     }
     if (s->drawn)
         s->drawn[p->number] += *got;

@@ -1,0 +1,159 @@
+"""Tests of range images as ellipsoids with the uncertainty of their distances. Expected values come
+from the formulas of the documentation, by NumPy."""
+import json
+import math
+import os
+import shutil
+import sys
+import unittest
+
+import numpy
+
+import program
+from test_points import grid, write_cloud, write_las
+
+sys.path.insert(0, program.DATASETS)
+import corner  # noqa: E402, the surfaces of the range images in datasets/corner
+
+CORNER = os.path.join(program.DATASETS, "corner")
+
+
+def write_frames(path, depths, focal, noise, colours=(), poses=()):
+    """Writes depth images in millimetres and transforms.json. Cameras stand in the origin unless
+    told otherwise, and look along -z."""
+    frames = []
+    for i, depth in enumerate(depths):
+        program.write_png(f"depth{i}.png", numpy.asarray(depth, numpy.uint16))
+        pose = poses[i] if i < len(poses) else numpy.eye(4)
+        frames.append({"depth_file_path": f"depth{i}.png", "transform_matrix": pose.tolist()})
+        if i < len(colours):
+            frames[-1]["file_path"] = colours[i]
+    height, width = numpy.shape(depths[0])
+    program.write(path, json.dumps({"frames": frames, "fl_x": focal, "fl_y": focal, "cx": width / 2,
+                                    "cy": height / 2, "depth_noise": noise}).encode())
+
+
+def facing(degrees):
+    return max(0, math.cos(math.radians(degrees))) ** 4
+
+
+class RangeImages(program.ProgramTest):
+    def lone(self, focal=5, noise=0.24):
+        """Writes one sample at (0, 0, -2). Its eight neighbours have no distance, so each counts 5 %
+        of the distance. Returns half the width of its pixel, and its uncertainty."""
+        write_frames("one.json", [[[0, 0, 0], [0, 2000, 0], [0, 0, 0]]], focal, [noise, 0, 0])
+        return 0.5 * 2 / focal, math.hypot(noise, 0.05 * 2)
+
+    def test_a_sample_is_an_ellipsoid_along_its_ray(self):
+        """The profile of its alpha in parallel views from several sides. Its weight is 0.8, since
+        its uncertainty is the mean."""
+        half, sigma = self.lone()
+        self.works("brick", "one.json", "-o", "one.trip", "-q", "--uncertainty")
+        place = {"objects": [{"data": "one.trip", "matrix": [
+            0, 0, 1, 5, 0, 1, 0, 0, -1, 0, 0, 0, 0, 0, 0, 1]}]}
+        program.write("scene.json", json.dumps(place).encode())
+        at = numpy.arange(65) - 32
+        for name, options in (("one.trip", ()), ("one.trip", ("--order", "lists")),
+                              ("one.trip", ("--renderer", "reference")), ("scene.json", ())):
+            for degrees in 0, 30, 60, 100:
+                turn = math.radians(degrees)
+                middle, away = [0, 0, -2], [3 * math.sin(turn), 0, 3 * math.cos(turn)]
+                if name == "scene.json":  # (x, y, z) goes to (z + 5, y, -x)
+                    middle, away = [3, 0, 0], [away[2], 0, -away[0]]
+                eye = [a + b for a, b in zip(middle, away)]
+                picture = self.picture(name, "--size", "65x65", "--ortho", 2, "--up", "0,1,0", "--eye",
+                                       ",".join(map(str, eye)), "--look", ",".join(map(str, middle)),
+                                       *options)[:, :, 3]
+                across = (math.cos(turn) * half) ** 2 + (math.sin(turn) * sigma) ** 2
+                for profile, square in (picture[32], across), (picture[:, 32], half ** 2):
+                    expected = (0.8 * facing(degrees) *
+                                numpy.exp(-at ** 2 / 2 / (square * 32.5 ** 2 + 0.3)))
+                    expected[expected < 1 / 255] = 0
+                    numpy.testing.assert_allclose(profile, expected, atol=0.006,
+                                                  err_msg=f"{name} {options} {degrees}")
+
+    def test_weights_fall_with_uncertainty(self):
+        """1 / (1 + (sigma / 2s)^2), with the harmonic mean s of all sigma. The view is the camera's."""
+        depth = numpy.zeros((9, 9))
+        depth[4, ::4] = 1000, 1500, 4000
+        write_frames("three.json", [depth], 9, [0.01, 0, 0.02])
+        z = numpy.array([1, 1.5, 4])
+        sigma = numpy.hypot(0.01 + 0.02 * z * z, 0.05 * z)
+        mean = 3 / (1 / sigma).sum()
+        expected = 1 / (1 + (sigma / (2 * mean)) ** 2)
+        self.assertTrue((numpy.diff(expected) < -0.05).all())
+        picture = self.picture("three.json", "--uncertainty", "--size", "63x63", "--eye", "0,0,0", "--look",
+                               "0,0,-1", "--up", "0,1,0", "--fov", math.degrees(2 * math.atan(4.5 / 9)))
+        numpy.testing.assert_allclose(picture[31, 3::28, 3], expected, atol=0.003)
+
+    def test_a_factor_widens_ellipsoids_and_keeps_their_length(self):
+        half, sigma = self.lone()
+        at = numpy.arange(65) - 32
+        picture = self.picture("one.json", "--uncertainty", "--radius", "2x", "--size", "65x65", "--ortho", 2,
+                               "--eye", "3,0,1", "--look", "0,0,-2", "--up", "0,1,0")[:, :, 3]
+        for profile, square in ((picture[32], 2 * half ** 2 + sigma ** 2 / 2),
+                                (picture[:, 32], 4 * half ** 2)):
+            expected = 0.8 * facing(45) * numpy.exp(-at ** 2 / 2 / (square * 32.5 ** 2 + 0.3))
+            expected[expected < 1 / 255] = 0
+            numpy.testing.assert_allclose(profile, expected, atol=0.006)
+
+    def error(self, degrees, *options):
+        """Returns the mean difference of 255 from the exact picture of the corner, and the covered
+        share."""
+        pose = corner.pose_at(degrees)
+        z, colours, _, _ = corner.photograph(pose)
+        eye, look, up = pose[:3, 3], pose[:3, 3] + pose[:3, 2], -pose[:3, 1]
+        view = [",".join(f"{x:.12g}" for x in v) for v in (eye, look, up)]
+        fov = math.degrees(2 * math.atan(0.5 * corner.SIZE[1] / corner.FOCAL))
+        picture = self.picture(CORNER, "--size", "160x120", "--eye", view[0], "--look", view[1], "--up",
+                               view[2], "--fov", fov, *options)
+        seen = (z < 4) & (picture[:, :, 3] > 0)
+        apart = numpy.abs(picture[:, :, :3] - colours * picture[:, :, 3:])[seen]
+        return 255 * apart.mean(), seen.mean()
+
+    def test_ellipsoids_show_the_corner_between_its_cameras(self):
+        """By depth, surfels of several noisy frames hide each other. Translucent ellipsoids blend them,
+        so the error falls."""
+        points = self.error(10, "--order", "depth")
+        ellipsoids = self.error(10, "--uncertainty", "--opacity-scale", 0.2, "--normalise")
+        self.assertGreater(min(points[1], ellipsoids[1]), 0.9)
+        self.assertLess(ellipsoids[0], 0.8 * points[0])
+
+    def test_normalising_does_not_count_the_background_twice(self):
+        self.lone()
+        view = ("one.json", "--uncertainty", "--size", "65x65", "--ortho", 2, "--eye", "0,0,3", "--look",
+                "0,0,-2", "--up", "0,1,0", "--normalise")
+        bare, red = self.picture(*view)[32], self.picture(*view, "--background", "red")[32]
+        covered = bare[:, 3] > 0.5
+        self.assertTrue(5 < covered.sum() < 60)
+        numpy.testing.assert_allclose(red[covered], bare[covered], atol=0.01)
+        numpy.testing.assert_allclose(red[0], [1, 0, 0, 1], atol=0.01)
+
+    # ---- refusals ----
+
+    def test_uncertainty_is_refused_for_what_has_none(self):
+        write_cloud("a.ply", grid(4))
+        write_las("a.las", grid(4), [2] * 16)
+        program.write_nrrd("v.nrrd", numpy.zeros((4, 4, 4), "u1"))
+        for name, says in (("a.ply", "applies to range images"), ("a.las", "applies to range images"),
+                           ("v.nrrd", "is no cloud"), (os.path.join(program.DATASETS, "train-1000.ply"),
+                                                       "is no cloud")):
+            self.leaves_nothing(2, "brick", name, "-o", "no.trip", "--uncertainty", says=says)
+            self.leaves_nothing(2, "render", name, "-o", "no.png", "--uncertainty", says=says)
+        self.lone()
+        for options in ("--k", 8), ("--radius", 0.1):
+            self.leaves_nothing(2, "brick", "one.json", "-o", "no.trip", "--uncertainty", *options,
+                                says="do not apply")
+
+    def test_memory_and_threads_do_not_change_the_data_set(self):
+        made = []
+        for i, options in enumerate((("--threads", 1), ("--threads", 3, "--memory", "24M"))):
+            self.works("brick", CORNER, "-o", f"{i}.trip", "-q", "--uncertainty", *options)
+            made.append([open(os.path.join(f"{i}.trip", name), "rb").read()
+                         for name in sorted(os.listdir(f"{i}.trip"))])
+            shutil.rmtree(f"{i}.trip")
+        self.assertEqual(*made)
+
+
+if __name__ == "__main__":
+    program.main()
