@@ -447,19 +447,19 @@ static void assert_same_files(const char *a, const char *b, size_t count)
 static void little_memory_suffices_and_gives_the_same_bytes(void **state)
 {
     (void)state;
-    scene s = { .count = 1000000 };
+    scene s = { .count = 400000 };
     uint64_t peak;
     /* So little memory needs several passes of merging. */
     assert_int_equal(brick(&s, NAME, 3 * MIB, &peak), TRIP_OK);
     assert_true(peak <= 3 * MIB);
     assert_int_equal(brick(&s, OTHER, 400 * MIB, NULL), TRIP_OK);
     assert_same_files(NAME, OTHER, 4);
-    s = (scene){ .count = 300000, .degree = 1 };
+    s = (scene){ .count = 150000, .degree = 1 };
     assert_int_equal(brick(&s, NAME, 3 * MIB, &peak), TRIP_OK);
     assert_true(peak <= 3 * MIB);
     assert_int_equal(brick(&s, OTHER, 30 * MIB, NULL), TRIP_OK);
     assert_same_files(NAME, OTHER, 7);
-    s = (scene){ .count = 300000, .degree = 1, .palette = true };
+    s = (scene){ .count = 100000, .degree = 1, .palette = true };
     assert_int_equal(brick(&s, NAME, 14 * MIB, &peak), TRIP_OK);
     assert_true(peak <= 14 * MIB);
     assert_int_equal(brick(&s, OTHER, 100 * MIB, NULL), TRIP_OK);
@@ -475,7 +475,7 @@ static void threads_and_equal_centres_do_not_change_the_bytes(void **state)
     } others[] = {
         { 4 * MIB, 1 }, { 20 * MIB, 2 }, { 40 * MIB, 3 }, { 40 * MIB, 200 }, { 400 * MIB, 5 }
     };
-    scene s = { .count = 200000, .degree = 1, .strays = 8, .step = 2, .threads = 1 };
+    scene s = { .count = 80000, .degree = 1, .strays = 8, .step = 2, .threads = 1 };
     assert_int_equal(brick(&s, OTHER, 400 * MIB, NULL), TRIP_OK);
     for (size_t i = 0; i < sizeof others / sizeof *others; i++) {
         uint64_t peak;
