@@ -55,10 +55,11 @@ int cached_volume_check_options(const char *input)
 {
     return cached_volume_wanted(input)
                ? 0
-               : trip_fail(TRIP_USAGE, "usage", input,
-                           "is a data set; --grid, --level-set, --spacing, --coordinates, --axes, "
-                           "--series, --time, --channel, --allow-gaps, --fill, --color, --k, "
-                           "--outliers, --radius and --uncertainty apply to files only");
+               : trip_fail(
+                     TRIP_USAGE, "usage", input,
+                     "is a data set; --grid, --level-set, --spacing, --coordinates, --axes, "
+                     "--series, --time, --channel, --allow-gaps, --fill, --color, --k, "
+                     "--outliers, --radius, --uncertainty and --hyperlines apply to files only");
 }
 
 /* Shows on a terminal that another process is bricking the same volume. */

@@ -20,8 +20,9 @@ typedef struct trip_gaussian {
     uint16_t antialiased;
     /* 1: the third axis points to the camera that saw it, and the opacity depends on the view
      * (gaussian_picture.h). */
-    uint16_t from_camera;
-    uint32_t merged; /* 1: of a coarse level, where it stands for Gaussians of the scene */
+    uint8_t from_camera;
+    uint8_t hyperline; /* 1: the coefficients hold colours from several cameras (hyperline.h) */
+    uint32_t merged;   /* 1: of a coarse level, where it stands for Gaussians of the scene */
 } trip_gaussian;
 
 /* Returns the number of coefficients up to a degree: 1, 4, 9 or 16. */

@@ -9,6 +9,7 @@
 #include "anatomy.h"
 #include "brick_points.h"
 #include "gaussian_format.h"
+#include "hyperlines.h"
 #include "library_context.h"
 #include "library_points.h"
 #include "neighbours.h"
@@ -96,15 +97,16 @@ _Static_assert((int)TRIPTYCH_POINT_COLOUR_AUTO == (int)TRIP_POINT_BY_AUTO &&
 static bool has_options(const triptych_brick_options *o)
 {
     return o->point_colour || o->point_neighbours || o->point_radius != 0 ||
-           o->point_radius_factor != 0 || o->point_outliers != 0 || o->point_uncertainty;
+           o->point_radius_factor != 0 || o->point_outliers != 0 || o->point_uncertainty ||
+           o->point_hyperlines;
 }
 
 int trip_context_check_no_points(const char *path, const triptych_brick_options *o)
 {
     return has_options(o)
                ? trip_fail(TRIP_USAGE, "brick", path,
-                           "is no cloud of points; --color, --k, --radius, --outliers and "
-                           "--uncertainty apply to clouds of points only")
+                           "is no cloud of points; --color, --k, --radius, --outliers, "
+                           "--uncertainty and --hyperlines apply to clouds of points only")
                : 0;
 }
 
@@ -124,6 +126,15 @@ static const char *fault_of(const triptych_brick_options *o)
     if (o->point_uncertainty && (o->point_neighbours || o->point_radius > 0))
         return "the uncertainty of distances sets the shapes of points, so neighbours and a radius "
                "do not apply: leave out --k, and give --radius a factor";
+    if (o->point_hyperlines && (o->point_neighbours || o->point_radius > 0))
+        return "the pixels of range images set the radii of hyperlines, so neighbours and a radius "
+               "do not apply: leave out --k, and give --radius a factor";
+    if (o->point_hyperlines && o->point_uncertainty)
+        return "the points of --hyperlines have no uncertainty: leave out one of the two options";
+    if (o->point_hyperlines && o->point_outliers > 0)
+        return "--outliers does not apply to --hyperlines: leave out one of the two options";
+    if (o->point_hyperlines && o->point_colour > TRIPTYCH_POINT_COLOUR_RGB)
+        return "hyperlines have the colours of their cameras: leave out --color";
     if (o->axes && !trip_anatomy_axes_valid(o->axes))
         return "the axes must be three letters: one of R and L, one of A and P, one of S and I";
     return NULL;
@@ -133,9 +144,9 @@ int trip_context_describe_points_form(const char *path, const triptych_brick_opt
                                       char text[256])
 {
     const char *fault = fault_of(o);
-    snprintf(text, 256, "points %d %u %a %a %a %d %s\n", (int)o->point_colour, o->point_neighbours,
-             o->point_radius, o->point_radius_factor, o->point_outliers, o->point_uncertainty != 0,
-             o->axes ? o->axes : "");
+    snprintf(text, 256, "points %d %u %a %a %a %d %d %s\n", (int)o->point_colour,
+             o->point_neighbours, o->point_radius, o->point_radius_factor, o->point_outliers,
+             o->point_uncertainty != 0, o->point_hyperlines != 0, o->axes ? o->axes : "");
     return fault ? trip_fail(TRIP_USAGE, "brick", path, "%s", fault) : 0;
 }
 
@@ -159,6 +170,11 @@ static void show_rows(void *user, uint64_t passed, uint64_t all)
         trip_context_show_stage(t, "brick", passed < all ? passed : all, all);
 }
 
+static void show_passed(void *user, uint64_t passed)
+{
+    show_rows(user, passed, 0);
+}
+
 static void describe_surfels(const trip_point_info *info, triptych_gaussians *out)
 {
     snprintf(out->format, sizeof out->format, "%s", info->format);
@@ -167,6 +183,38 @@ static void describe_surfels(const trip_point_info *info, triptych_gaussians *ou
     out->left_out = info->left_out;
     memcpy(out->lo, info->lo, sizeof out->lo);
     memcpy(out->hi, info->hi, sizeof out->hi);
+}
+
+/* Bricks fused range images. */
+static int brick_hyperlines(const trip_brick_points_params *p, trip_budget *budget,
+                            trip_brick_gaussians_result *made)
+{
+    trip_hyperlines *h = NULL;
+    int status = trip_hyperlines_open(&h, p->file_name, p->threads, budget);
+    if (status == 0 && p->radius_factor > 0)
+        trip_hyperlines_set_factor(h, p->radius_factor);
+    if (status == 0)
+        status = trip_brick_gaussians(
+            &(trip_brick_gaussians_params){ .path = p->path,
+                                            .replace = p->replace,
+                                            .source = trip_hyperlines_read,
+                                            .source_user = h,
+                                            .source_name = p->file_name,
+                                            .degree = TRIP_SH_DEGREE_MAX,
+                                            .harmonics = TRIP_BRICK_HARMONICS_WHOLE,
+                                            .flags = p->flags | TRIP_GAUSSIAN_FLAT |
+                                                     TRIP_GAUSSIAN_CLOUD | TRIP_GAUSSIAN_HYPERLINES,
+                                            .text = p->text,
+                                            .threads = p->threads,
+                                            .progress = show_passed,
+                                            .progress_user = p->progress_user },
+            budget, made);
+    if (status == 0)
+        trip_note(p->file_name, "%llu of %llu samples are in other frames too; they were fused",
+                  (unsigned long long)trip_hyperlines_fused(h),
+                  (unsigned long long)trip_hyperlines_samples(h));
+    trip_hyperlines_close(h);
+    return status;
 }
 
 static int brick_file(triptych *t, trip_point_file *f, const char *path, const char *data_set,
@@ -191,10 +239,11 @@ static int brick_file(triptych *t, trip_point_file *f, const char *path, const c
                                              &params.colouring);
     describe_surfels(info, out);
     out->flat = !o->point_uncertainty;
-    if (status == 0 && o->point_uncertainty && !(info->attributes & TRIP_POINT_UNCERTAINTY))
+    if (status == 0 && (o->point_uncertainty || o->point_hyperlines) &&
+        !(info->attributes & TRIP_POINT_UNCERTAINTY))
         status = trip_fail(TRIP_USAGE, "brick", path,
-                           "tells no uncertainty of its distances; --uncertainty applies to range "
-                           "images with poses");
+                           "is no sequence of range images with poses; --%s applies to these alone",
+                           o->point_uncertainty ? "uncertainty" : "hyperlines");
     if (status == 0)
         status = find_up(info, path, o->axes, out->up);
     char *notes = status == 0 ? trip_context_scene_notes(path, out) : NULL;
@@ -206,7 +255,8 @@ static int brick_file(triptych *t, trip_point_file *f, const char *path, const c
     params.up[out->up[down] - 'x'] = down ? -1 : 1;
     params.flags = out->up[0] == 'z' ? TRIP_GAUSSIAN_Z_UP : down ? TRIP_GAUSSIAN_Y_DOWN : 0;
     params.text = notes;
-    status = trip_brick_points(&params, budget, &made);
+    status = o->point_hyperlines ? brick_hyperlines(&params, budget, &made)
+                                 : trip_brick_points(&params, budget, &made);
     if (status == 0) {
         trip_point_file_print_notes(f);
         if (!o->point_colour && params.colouring != TRIP_POINT_BY_RGB)

@@ -158,6 +158,8 @@ typedef struct triptych_brick_options {
     /* If not 0, samples of range images become ellipsoids with the uncertainty of their distance.
      * Other clouds are refused. */
     int point_uncertainty;
+    /* If not 0, range images are fused into points with the colours of several cameras. */
+    int point_hyperlines;
 
     /* ---- the opacity envelope: the union of the following; `automatic` if none is given ---- */
 

@@ -363,6 +363,11 @@ static const trip_option point_rows[] = {
       "Draws each sample of a range image as an ellipsoid along its ray, as "
       "long as its distance is uncertain",
       "surfels", .group = DRAW_GROUP_POINTS, .type = TRIP_OPTION_FLAG, AT(point_uncertainty) },
+    { "hyperlines", NULL,
+      "Fuses range images into points that look as the cameras nearest to the "
+      "view saw them",
+      "each sample is a point", .group = DRAW_GROUP_POINTS, .type = TRIP_OPTION_FLAG,
+      AT(point_hyperlines) },
 };
 #undef AT
 

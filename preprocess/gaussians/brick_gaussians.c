@@ -366,6 +366,9 @@ static int emit_coarse(void *user, uint64_t node, const trip_gaussian *g)
     const trip_spilled head = { .number = b->records + b->coarse, .group = node };
     memcpy(to, &head, sizeof head);
     memcpy(to + sizeof head, g, b->stride - sizeof head);
+    if (b->p->flags & TRIP_GAUSSIAN_HYPERLINES) /* the mean colour alone */
+        memset(to + sizeof head + offsetof(trip_gaussian, sh) + sizeof g->sh[0], 0,
+               b->stride - sizeof head - offsetof(trip_gaussian, sh) - sizeof g->sh[0]);
     b->groups[group_of(b, node, class_of(g))]++;
     if (trip_gaussian_is_sampled(b->coarse, b->records)) {
         trip_gaussian_point *point = &b->sample.points[b->sample.count++];

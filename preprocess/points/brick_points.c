@@ -483,8 +483,7 @@ static bool is_outlier(bricker *b, const trip_point_row *row)
 
 /* ---- surfels ---- */
 
-/* Sets a rotation that takes the third axis to a normal of unit length. */
-static void turn_to(const float normal[3], float rotation[4])
+void trip_point_turn_to(const float normal[3], float rotation[4])
 {
     const double x = (double)normal[0], y = (double)normal[1], z = (double)normal[2];
     const double w = 1 + z, length = sqrt(w * w + x * x + y * y);
@@ -503,7 +502,7 @@ static void make_surfel(const bricker *b, const trip_point_row *row, trip_gaussi
     memset(g, 0, sizeof *g);
     memcpy(g->centre, row->position, sizeof g->centre);
     g->deviations[0] = g->deviations[1] = deviation;
-    turn_to(row->normal, g->rotation);
+    trip_point_turn_to(row->normal, g->rotation);
     g->opacity = 1;
     if (b->p->uncertain)
         trip_point_stretch(g, row, factor, b->info->uncertainty);

@@ -37,6 +37,9 @@ typedef struct trip_brick_points_params {
     void *progress_user;
 } trip_brick_points_params;
 
+/* Sets a rotation that takes the third axis to a normal of unit length. */
+void trip_point_turn_to(const float normal[3], float rotation[4]);
+
 int trip_brick_points(const trip_brick_points_params *params, trip_budget *budget,
                       trip_brick_gaussians_result *result);
 

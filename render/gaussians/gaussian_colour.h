@@ -6,6 +6,7 @@
 #include <math.h>
 
 #include "gaussian_picture.h"
+#include "hyperline.h"
 
 /* Computes the values of the first trip_sh_count(degree) harmonics for a direction of unit length.
  * The signs follow Kerbl et al. 2023. */
@@ -47,6 +48,14 @@ static inline void trip_gaussian_colour(const trip_gaussian *g, int degree, trip
                                         double rgb[3])
 {
     double basis[TRIP_SH_MAX];
+    if (g->hyperline) {
+        for (int c = 0; c < 3; c++)
+            rgb[c] = 0.5 + TRIP_SH_CONSTANT * (double)g->sh[0][c];
+        trip_hyperline_add(g, degree, (double[]){ -direction.x, -direction.y, -direction.z }, rgb);
+        for (int c = 0; c < 3; c++)
+            rgb[c] = fmin(TRIP_GAUSSIAN_COLOUR_MAX, fmax(0, rgb[c]));
+        return;
+    }
     trip_sh_basis(degree, direction, basis);
     for (int c = 0; c < 3; c++) {
         double sum = 0.5;

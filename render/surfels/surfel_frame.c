@@ -262,6 +262,7 @@ static uint32_t get_surfel(const void *context, size_t i, trip_gaussian *out)
         begin = p->end;
     decode(p, i - begin, out);
     out->merged = p->brick->is_coarse;
+    out->hyperline = (p->set->set->header.flags & TRIP_GAUSSIAN_HYPERLINES) != 0;
     if (p->brick->share < 1)
         out->opacity = 1 - powf(1 - fminf(out->opacity, 0.99f), p->brick->share);
     trip_gaussian_transform_apply(&p->set->placement, p->degree, out);

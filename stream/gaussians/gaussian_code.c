@@ -326,7 +326,8 @@ void trip_gaussian_decode(const trip_file_gaussian_brick *b, const unsigned char
     const words r = load(record);
     memset(out->sh, 0, sizeof out->sh);
     out->merged = 0;
-    out->antialiased = out->from_camera = 0;
+    out->antialiased = 0;
+    out->from_camera = out->hyperline = 0;
     trip_gaussian_decode_centre(b, record, out->centre);
     decode_shape(b, r, out);
     out->sh[0][0] = decode_colour(b, bits(r.w[1], 50, 14), 0);

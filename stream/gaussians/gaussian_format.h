@@ -38,7 +38,8 @@ enum trip_gaussian_flag {
     TRIP_GAUSSIAN_SHADED = 64,     /* of a cloud: light shades its colours by default */
     /* samples of range images: the third axis points to the camera */
     TRIP_GAUSSIAN_FROM_CAMERA = 128,
-    TRIP_GAUSSIAN_FLAGS = 255,
+    TRIP_GAUSSIAN_HYPERLINES = 256, /* the coefficients hold colours of cameras (hyperline.h) */
+    TRIP_GAUSSIAN_FLAGS = 511,
 };
 
 typedef struct trip_file_gaussian_header {

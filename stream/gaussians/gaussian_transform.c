@@ -3,6 +3,8 @@
 #include <math.h>
 #include <string.h>
 
+#include "hyperline.h"
+
 static double determinant(double m[3][3])
 {
     return m[0][0] * (m[1][1] * m[2][2] - m[1][2] * m[2][1]) -
@@ -69,6 +71,7 @@ bool trip_gaussian_transform_make(trip_gaussian_transform *t, const double m[3][
               fabs(length[2] - length[0]) <= 1e-6 * length[0];
     to_quaternion(r, t->rotation);
     t->turned = fabs(t->rotation[0]) < 1;
+    memcpy(t->turn, r, sizeof t->turn);
     trip_harmonics_rotation_make(&t->harmonics, (const double(*)[3])r);
     return true;
 }
@@ -196,6 +199,8 @@ void trip_gaussian_transform_apply(const trip_gaussian_transform *t, int degree,
     } else {
         reshape(t, g);
     }
-    if (t->turned)
+    if (t->turned && g->hyperline)
+        trip_hyperline_turn(g, (const double(*)[3])t->turn);
+    else if (t->turned)
         trip_harmonics_rotate(&t->harmonics, degree, g->sh);
 }

@@ -13,6 +13,7 @@ typedef struct trip_gaussian_transform {
     double scale;       /* if `even` */
     double rotation[4]; /* w, x, y, z; if `even` */
     bool turned;        /* the rotation is not the identity */
+    double turn[3][3];  /* the rotation as a matrix */
     trip_harmonics_rotation harmonics;
 } trip_gaussian_transform;
 

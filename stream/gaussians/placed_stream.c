@@ -316,9 +316,10 @@ static int read_part(const trip_placed_stream *s, part *p, trip_gaussian *out, d
     const int degree = wanted < 0 ? 0 : wanted < most ? wanted : most;
     const int status = trip_gaussian_stream_next(p->stream, out, keys, room, got);
     for (size_t i = 0; i < *got && !status; i++) {
-        trip_gaussian_transform_apply(&set->placement, degree, &out[i]);
         out[i].antialiased = (h->flags & TRIP_GAUSSIAN_ANTIALIASED) != 0;
         out[i].from_camera = h->flags & TRIP_GAUSSIAN_FROM_CAMERA && !out[i].merged;
+        out[i].hyperline = (h->flags & TRIP_GAUSSIAN_HYPERLINES) != 0;
+        trip_gaussian_transform_apply(&set->placement, degree, &out[i]);
     }
     if (s->drawn)
         s->drawn[p->number] += *got;

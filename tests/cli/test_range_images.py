@@ -1,11 +1,15 @@
-"""Tests of range images as ellipsoids with the uncertainty of their distances. Expected values come
-from the formulas of the documentation, by NumPy."""
+"""Tests of range images as ellipsoids with the uncertainty of their distances, and as hyperlines.
+Expected values come from the formulas of the documentation, by NumPy."""
+import glob
 import json
 import math
 import os
+import pathlib
 import shutil
+import struct
 import sys
 import unittest
+import zlib
 
 import numpy
 
@@ -31,6 +35,16 @@ def write_frames(path, depths, focal, noise, colours=(), poses=()):
     height, width = numpy.shape(depths[0])
     program.write(path, json.dumps({"frames": frames, "fl_x": focal, "fl_y": focal, "cx": width / 2,
                                     "cy": height / 2, "depth_noise": noise}).encode())
+
+
+def write_rgb(path, image):
+    def chunk(name, data):
+        return struct.pack(">I", len(data)) + name + data + struct.pack(">I", zlib.crc32(name + data))
+    height, width, _ = image.shape
+    program.write(path, b"\x89PNG\r\n\x1a\n" + chunk(
+        b"IHDR", struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)) + chunk(
+            b"IDAT", zlib.compress(b"".join(b"\0" + row.tobytes() for row in image))) +
+                  chunk(b"IEND", b""))
 
 
 def facing(degrees):
@@ -129,13 +143,96 @@ class RangeImages(program.ProgramTest):
         numpy.testing.assert_allclose(red[covered], bare[covered], atol=0.01)
         numpy.testing.assert_allclose(red[0], [1, 0, 0, 1], atol=0.01)
 
+    # ---- hyperlines ----
+
+    def wall(self, colours):
+        """Writes range images of the wall z = -2. Cameras stand beside one another, and each sees a
+        color of its own. Returns their places."""
+        places = numpy.array([[0.5 * i - 0.5, 0.1 * i, 0] for i in range(len(colours))])
+        poses = numpy.tile(numpy.eye(4), (len(colours), 1, 1))
+        poses[:, :3, 3] = places
+        for i, colour in enumerate(colours):
+            write_rgb(f"colour{i}.png", numpy.tile(numpy.uint8(colour), (15, 20, 1)))
+        write_frames("wall.json", [numpy.full((15, 20), 2000)] * len(colours), 20, [0.01, 0, 0],
+                     [f"colour{i}.png" for i in range(len(colours))], poses)
+        return places
+
+    def pixel(self, data, eye, look, *options):
+        picture = self.picture(data, "--size", "9x9", "--fov", 2, "--up", "0,1,0", "--eye",
+                               ",".join(map(str, eye)), "--look", ",".join(map(str, look)), *options)
+        self.assertGreater(picture[4, 4, 3], 0.95)
+        return picture[4, 4, :3] / picture[4, 4, 3]
+
+    def test_a_point_has_the_colours_of_the_cameras_near_the_view(self):
+        """Weights are the cosine of the angle between the rays to the eye and to a camera, to the
+        power 32."""
+        colours = numpy.array([[150, 100, 120], [110, 150, 100], [120, 110, 160]])
+        places, at = self.wall(colours), numpy.array([0, 0, -2])
+        self.works("brick", "wall.json", "-o", "wall.trip", "-q", "--hyperlines")
+        place = {"objects": [{"data": "wall.trip", "matrix": [
+            0, 0, 1, 5, 0, 1, 0, 0, -1, 0, 0, 0, 0, 0, 0, 1]}]}
+        program.write("wall.scene.json", json.dumps(place).encode())
+        to = (places - at) / numpy.linalg.norm(places - at, axis=1)[:, None]
+        for eye in [-1, 0, 0], [0.3, 0.4, -0.5]:
+            view = (eye - at) / numpy.linalg.norm(eye - at)
+            weights = (to @ view) ** 32
+            expected = weights @ colours / weights.sum() / 255
+            for options in (), ("--order", "lists"), ("--order", "depth"), ("--renderer", "reference"):
+                numpy.testing.assert_allclose(self.pixel("wall.trip", eye, at, *options), expected, atol=0.012,
+                                              err_msg=f"{eye} {options}")
+            turned = self.pixel("wall.scene.json", [eye[2] + 5, eye[1], -eye[0]], [3, 0, 0])
+            numpy.testing.assert_allclose(turned, expected, atol=0.012, err_msg=str(eye))
+        mean = self.pixel("wall.trip", [-1, 0, 0], at, "--sh", 0)
+        numpy.testing.assert_allclose(mean, colours.mean(axis=0) / 255, atol=0.012)
+        self.works("info", "wall.trip", "--verify")
+
+    def test_frames_of_one_wall_are_fused(self):
+        """Frames after the first keep what it does not see. The point takes the mean distance."""
+        self.wall([[200, 0, 0]] * 3)
+        run = self.works("brick", "wall.json", "-o", "fused.trip", "--json", "--hyperlines")
+        count = json.loads(run.stdout)["gaussians"]
+        self.assertIn(f"{900 - count} of 900 samples", run.stderr)
+        # the others lie 5 and 10 pixels aside, and 1 and 2 pixels up; half a pixel of each may be lost
+        seen = 300 + 2 * (5 * 14 + 1 * 20)
+        self.assertTrue(seen - 60 <= count <= seen + 80, count)
+        program.write_png("depth1.png", numpy.full((15, 20), 2020, numpy.uint16))
+        self.works("brick", "wall.json", "-o", "moved.trip", "-q", "--hyperlines")
+        z = [self.depth_of(name) for name in ("fused.trip", "moved.trip")]
+        self.assertAlmostEqual(z[0], 2, delta=1e-3)
+        self.assertAlmostEqual(z[1], 2 + 0.02 / 3, delta=1e-3)
+
+    def depth_of(self, data):
+        self.works("render", data, "-o", "a.exr", "--depth", "deep.exr", "--size", "9x9", "--fov", 2, "--eye", "0,0,0",
+                   "--look", "0,0,-2", "--up", "0,1,0")
+        return program.read_exr_channels("deep.exr")[1][4, 4, 0]
+
+    def test_hyperlines_show_the_corner_between_its_cameras(self):
+        """The error is smaller than that of surfels, whose noise is not averaged."""
+        points, lines = self.error(10), self.error(10, "--hyperlines")
+        self.assertGreater(min(points[1], lines[1]), 0.9)
+        self.assertLess(lines[0], 0.9 * points[0])
+
     # ---- refusals ----
+
+    def test_hyperlines_are_refused_for_other_clouds_and_with_other_shapes(self):
+        write_cloud("a.ply", grid(4))
+        self.leaves_nothing(2, "brick", "a.ply", "-o", "no.trip", "--hyperlines", says="is no sequence")
+        program.write_nrrd("v.nrrd", numpy.zeros((4, 4, 4), "u1"))
+        self.leaves_nothing(2, "brick", "v.nrrd", "-o", "no.trip", "--hyperlines", says="is no cloud")
+        self.lone()
+        self.leaves_nothing(1, "brick", "one.json", "-o", "no.trip", "--hyperlines",
+                            says="has no colour image")
+        for options in ("--k", 8), ("--radius", 0.1), ("--outliers", 1), ("--color", "height"), ("--uncertainty",):
+            self.leaves_nothing(2, "brick", CORNER, "-o", "no.trip", "--hyperlines", *options,
+                                says="leave out")
+        self.leaves_nothing(1, "brick", CORNER, "-o", "no.trip", "--hyperlines", "--memory", "1M",
+                            says="raise --memory")
 
     def test_uncertainty_is_refused_for_what_has_none(self):
         write_cloud("a.ply", grid(4))
         write_las("a.las", grid(4), [2] * 16)
         program.write_nrrd("v.nrrd", numpy.zeros((4, 4, 4), "u1"))
-        for name, says in (("a.ply", "applies to range images"), ("a.las", "applies to range images"),
+        for name, says in (("a.ply", "is no sequence of range images"), ("a.las", "is no sequence"),
                            ("v.nrrd", "is no cloud"), (os.path.join(program.DATASETS, "train-1000.ply"),
                                                        "is no cloud")):
             self.leaves_nothing(2, "brick", name, "-o", "no.trip", "--uncertainty", says=says)
@@ -147,12 +244,12 @@ class RangeImages(program.ProgramTest):
 
     def test_memory_and_threads_do_not_change_the_data_set(self):
         made = []
-        for i, options in enumerate((("--threads", 1), ("--threads", 3, "--memory", "24M"))):
-            self.works("brick", CORNER, "-o", f"{i}.trip", "-q", "--uncertainty", *options)
-            made.append([open(os.path.join(f"{i}.trip", name), "rb").read()
-                         for name in sorted(os.listdir(f"{i}.trip"))])
-            shutil.rmtree(f"{i}.trip")
-        self.assertEqual(*made)
+        for kind in "--uncertainty", "--hyperlines":
+            for options in ("--threads", 1), ("--threads", 3, "--memory", "24M"):
+                self.works("brick", CORNER, "-o", "some.trip", "-q", kind, *options)
+                made.append([pathlib.Path(path).read_bytes() for path in sorted(glob.glob("some.trip/*"))])
+                shutil.rmtree("some.trip")
+            self.assertEqual(*made[-2:])
 
 
 if __name__ == "__main__":
