@@ -1,5 +1,5 @@
-/* bench surfels: measures deferred pictures of a cloud of points with and without the selection of
- * visible surfels, with Tables 1 and 2 and Figure 6 of Guennebaud, Barthe & Paulin 2004. */
+/* bench surfels: measures deferred pictures of a cloud with and without the selection of visible
+ * surfels. Tables 1 and 2 and Figure 6 of Guennebaud, Barthe & Paulin 2004 stand beside. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

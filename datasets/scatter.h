@@ -1,4 +1,5 @@
-/* Numbers that look random and depend only on what is asked: same output on every machine. */
+/* Numbers that look random. They depend on the arguments alone, and are the same on every machine.
+ */
 #ifndef TRIP_SCATTER_H
 #define TRIP_SCATTER_H
 

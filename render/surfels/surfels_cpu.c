@@ -289,10 +289,12 @@ static unsigned tasks_for(size_t count, size_t per_task)
     return (unsigned)((count + per_task - 1) / per_task);
 }
 
-int trip_surfels_cpu_add_from(trip_surfels_cpu *s, trip_surfel_getter *get, const void *context,
-                              size_t count)
+static void blend_batch(void *context, unsigned strip);
+
+/* Projects surfels batch by batch, and lets them take their cells, or blends them. */
+static int project_all(trip_surfels_cpu *s, trip_surfel_getter *get, const void *context,
+                       size_t count)
 {
-    const uint64_t began = trip_now_ns();
     s->get = get;
     s->context = context;
     for (s->from = 0; s->from < count; s->from += s->count) {
@@ -301,9 +303,23 @@ int trip_surfels_cpu_add_from(trip_surfels_cpu *s, trip_surfel_getter *get, cons
             return status;
         s->count = count - s->from < s->batch_max ? count - s->from : s->batch_max;
         trip_run_tasks(&s->runner, project_some, s, tasks_for(s->count, TASK));
+        if (s->blending) {
+            trip_run_tasks(&s->runner, blend_batch, s, tasks_for((size_t)s->camera.height, STRIP));
+            continue;
+        }
         trip_run_tasks(&s->runner, write_some, s, tasks_for(s->count, TASK));
         trip_depth_pyramid_refresh(&s->pyramid, s->depths, &s->runner);
     }
+    return 0;
+}
+
+int trip_surfels_cpu_add_from(trip_surfels_cpu *s, trip_surfel_getter *get, const void *context,
+                              size_t count)
+{
+    const uint64_t began = trip_now_ns();
+    const int status = project_all(s, get, context, count);
+    if (status)
+        return status;
     s->stats.added += count;
     s->stats.outside = s->outside;
     s->stats.hidden = s->hidden;
@@ -444,18 +460,9 @@ int trip_surfels_cpu_blend_from(trip_surfels_cpu *s, trip_surfel_getter *get, co
     if (!s->blending)
         memset(s->sums, 0, s->pixels * sizeof *s->sums);
     s->blending = true;
-    s->get = get;
-    s->context = context;
-    for (s->from = 0; s->from < count; s->from += s->count) {
-        const int status = trip_frame_poll();
-        if (status)
-            return status;
-        s->count = count - s->from < s->batch_max ? count - s->from : s->batch_max;
-        trip_run_tasks(&s->runner, project_some, s, tasks_for(s->count, TASK));
-        trip_run_tasks(&s->runner, blend_batch, s, tasks_for((size_t)s->camera.height, STRIP));
-    }
+    const int status = project_all(s, get, context, count);
     s->stats.blend_ns += trip_now_ns() - began;
-    return 0;
+    return status;
 }
 
 static void divide_strip(void *context, unsigned strip)
