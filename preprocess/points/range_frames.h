@@ -1,10 +1,10 @@
 /* Describes the images of a range data set: a sequence of depth images with cameras. Two layouts
  * are folders, and one is a JSON file:
  *
- *   7-Scenes   frame-*.depth.png, frame-*.color.jpg or .png, frame-*.pose.txt,
- * camera-intrinsics.txt ScanNet    depth/N.png, color/N.jpg, pose/N.txt,
- * intrinsic/intrinsic_depth.txt JSON       transforms.json of instant-ngp and nerfstudio, with
- * depth_file_path
+ * - 7-Scenes: frame-*.depth.png, frame-*.color.jpg or .png, frame-*.pose.txt and
+ *   camera-intrinsics.txt
+ * - ScanNet: depth/N.png, color/N.jpg, pose/N.txt and intrinsic/intrinsic_depth.txt
+ * - transforms.json of instant-ngp and nerfstudio, with depth_file_path
  *
  * A pose is a 4 x 4 matrix from the camera to the scene. Cameras of the folders have x to the
  * right, y down and z forward. Cameras of the JSON file have x to the right, y up and z backward. A
