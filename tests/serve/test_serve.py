@@ -291,6 +291,8 @@ class Serve(program.ProgramTest):
         picture, number, camera = self.whole_picture(after)
         while picture.shape[:2] != (90, 120):  # drawn before the change of size
             picture, number, camera = self.whole_picture(number)
+        while "--size 120x90" not in camera:  # said before the change
+            camera = self.status()["camera"]
         self.works("render", data, "-o", "r.png", *options, *shlex.split(camera))
         with open("r.png", "rb") as f:
             expected = read_png(f.read())
