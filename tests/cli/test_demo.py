@@ -313,7 +313,7 @@ class Reconfigured(program.ProgramTest):
         self.assertEqual(changed, {
             "common/image_helper.c", "preprocess/readers/read_netcdf4.c", "preprocess/readers/read_vdb.c",
             "datasets/generate.c", "datasets/landscape.c", "datasets/landscape_cells.c",
-            "datasets/cloud_landscape.c", "datasets/without/vdb.c",
+            "datasets/cloud_landscape.c", "datasets/scene_landscape.c", "datasets/tree.c", "datasets/without/vdb.c",
             "preprocess/points/without/neighbour_tree.c", "render/without/gl.c", "view/without/view.c",
             "serve/without/serve.c", "render/cpu/kernels/isa.c"})
         self.assertGreater(len(commands["ON"]), 300)
