@@ -25,7 +25,7 @@ typedef struct trip_range_frame {
     char *colour;      /* path, or NULL */
     double pose[3][4]; /* to the scene, from x to the right, y down, z forward */
     /* In pixels of an image of size[0] x size[1]; sizes of 0 mean the depth image. Pixel i reaches
-     * from i to i + 1. */
+     * from i to i + 1. A centre that is not a number means the middle of the image. */
     double focal[2], centre[2], size[2];
     double angle; /* field of view in x, in radians, if focal[0] is 0 */
     /* Lens distortion as in OpenCV: k1, k2, p1, p2. */

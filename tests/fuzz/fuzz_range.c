@@ -37,7 +37,7 @@ static void check(const trip_range_frame *f)
     for (int i = 0; i < 12; i++)
         FUZZ_PROMISE(isfinite(f->pose[i / 4][i % 4]));
     for (int i = 0; i < 2; i++)
-        FUZZ_PROMISE(isfinite(f->focal[i]) && isfinite(f->centre[i]) && isfinite(f->size[i]));
+        FUZZ_PROMISE(isfinite(f->focal[i]) && !isinf(f->centre[i]) && isfinite(f->size[i]));
     for (int i = 0; i < 4; i++)
         FUZZ_PROMISE(isfinite(f->distortion[i]));
     FUZZ_PROMISE(isfinite(f->scale) && isfinite(f->nearest) && isfinite(f->angle));
