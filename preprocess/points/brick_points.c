@@ -10,6 +10,7 @@
 #include "gaussian_check.h"
 #include "gaussian_format.h"
 #include "point_ellipsoid.h"
+#include "point_sides.h"
 #include "point_tiles.h"
 #include "report.h"
 #include "surfel_shape.h"
@@ -46,6 +47,7 @@ typedef struct bricker {
     trip_point_palette palette;
     trip_octree octree;
     trip_point_tiles *tiles;
+    trip_point_sides *sides; /* NULL: normals keep the sides that they have */
     trip_workers *workers;
     /* Rows of tiles, TRIP_POINT_TILE_MAX each. A loop completes one half while the other half is
      * given out. */
@@ -76,10 +78,22 @@ static bool has_late_values(const bricker *b)
     return b->p->colouring == TRIP_POINT_BY_DENSITY;
 }
 
+/* Whether nothing tells the sides of normals: neither the file, nor scanners, nor a flight. */
+static bool has_free_sides(const bricker *b)
+{
+    const char *format = b->info->format;
+    bool told = b->p->uncertain || b->info->attributes & TRIP_POINT_NORMAL ||
+                !strncmp(format, "LAS", 3) || !strncmp(format, "LAZ", 3) ||
+                !strncmp(format, "COPC", 4);
+    for (uint32_t i = 0; i < b->info->scan_count && !told; i++)
+        told = b->info->scans[i].posed;
+    return !told;
+}
+
 /* Whether all rows are completed before the first one is given out. */
 static bool completes_first(const bricker *b)
 {
-    return b->p->outliers > 0 || has_late_values(b);
+    return b->p->outliers > 0 || has_late_values(b) || has_free_sides(b);
 }
 
 static void tell(void *user, uint64_t more)
@@ -308,7 +322,10 @@ static int complete_tile(void *user, unsigned thread, uint64_t item)
     const uint32_t count = trip_point_tiles_at(b->tiles, tile)->count;
     trip_neighbours n = { .count = 0 };
     const unsigned wanted = b->p->neighbours ? b->p->neighbours : TRIP_POINT_NEIGHBOURS;
+    const unsigned room = (unsigned)((rows - b->rows) / TRIP_POINT_TILE_MAX);
     int status = trip_point_tiles_read(b->tiles, tile, rows);
+    if (status == 0 && b->sides)
+        trip_point_sides_begin(b->sides, room, rows, count);
     if (status == 0)
         status = trip_point_tiles_prepare(b->tiles, thread, tile, rows, wanted);
     for (uint32_t i = 0; i < count && status == 0; i++) {
@@ -319,7 +336,11 @@ static int complete_tile(void *user, unsigned thread, uint64_t item)
             status = trip_point_tiles_search(b->tiles, thread, tile, &n);
         }
         complete_row(b, &n, &rows[i]);
+        if (b->sides)
+            trip_point_sides_note(b->sides, room, i, &n);
     }
+    if (b->sides && status == 0)
+        trip_point_sides_join(b->sides, thread, room);
     return status;
 }
 
@@ -427,6 +448,8 @@ static int spool_tiles(bricker *b, trip_output *rows)
             for (uint32_t i = 0; i < count; i++)
                 note_row(b, &from[i], ++number);
             status = trip_output_append(rows, from, count * sizeof *from);
+            if (status == 0 && b->sides)
+                status = trip_point_sides_keep(b->sides, b->half * b->rooms + t);
         }
         tell(b, number);
         if (status == 0)
@@ -451,6 +474,21 @@ static int make_late_palette(bricker *b)
     return make_palette(b, lo, hi);
 }
 
+static int create_sides(bricker *b)
+{
+    trip_point_sides_params params = { .tiles = b->tiles,
+                                       .rooms = 2 * b->rooms,
+                                       .threads = trip_workers_count(b->workers),
+                                       .folder = b->folder,
+                                       .name = b->p->path };
+    const bool up = b->p->flags & TRIP_GAUSSIAN_Z_UP;
+    for (int a = 0; a < 3; a++) {
+        params.middle[a] = (b->lo[a] + b->hi[a]) / 2;
+        params.up[a] = up ? b->p->up[a] : 0;
+    }
+    return trip_point_sides_create(&b->sides, &params, b->budget);
+}
+
 /* Completes all rows before the first one is given out, since a choice depends on all of them. The
  * spool then holds them in the order of the tiles. */
 static int complete_first(bricker *b)
@@ -463,8 +501,12 @@ static int complete_first(bricker *b)
                                                            .buffer_bytes = SPOOL_BYTES,
                                                            .unnamed = true },
                                     b->budget);
+    if (status == 0 && has_free_sides(b))
+        status = create_sides(b);
     if (status == 0)
         status = spool_tiles(b, &rows);
+    if (status == 0 && b->sides)
+        status = trip_point_sides_choose(b->sides, &rows, b->rows);
     release_tiles(b);
     b->spool = rows;
     b->lacking = false; /* the rows are complete */
@@ -543,9 +585,12 @@ static int next_of_spool(bricker *b, trip_gaussian *out, size_t room, size_t *go
             trip_output_read(&b->spool, b->given * sizeof *rows, rows, count * sizeof *rows);
         if (status < 0)
             return status;
-        for (size_t i = 0; i < count; i++)
+        for (size_t i = 0; i < count; i++) {
+            if (b->sides)
+                trip_point_sides_turn(b->sides, &rows[i]);
             if (!is_outlier(b, &rows[i]))
                 make_surfel(b, &rows[i], &out[(*got)++]);
+        }
         b->given += count;
     }
     return 0;
@@ -580,6 +625,7 @@ static int brick_surfels(bricker *b, trip_brick_gaussians_result *result)
     const trip_brick_points_params *p = b->p;
     const uint32_t surfels = TRIP_GAUSSIAN_FLAT | TRIP_GAUSSIAN_CLOUD |
                              (p->colouring == TRIP_POINT_BY_RGB ? 0 : TRIP_GAUSSIAN_SHADED);
+    const bool keeps_order = b->ordered && !(p->outliers > 0);
     release_sample(b);
     b->passed += b->records;
     return trip_brick_gaussians(
@@ -589,8 +635,8 @@ static int brick_surfels(bricker *b, trip_brick_gaussians_result *result)
             .source = give_surfels,
             .source_user = b,
             .source_name = p->file_name,
-            .octree = b->lacking ? &b->octree : NULL,
-            .octree_records = b->lacking ? b->records : 0,
+            .octree = keeps_order ? &b->octree : NULL,
+            .octree_records = keeps_order ? b->records : 0,
             .flags = p->flags | (p->uncertain ? TRIP_GAUSSIAN_FROM_CAMERA : surfels),
             .text = p->text,
             .threads = p->threads,
@@ -646,6 +692,7 @@ int trip_brick_points(const trip_brick_points_params *params, trip_budget *budge
     };
     const int status = run(&b, result);
     release_tiles(&b);
+    trip_point_sides_free(b.sides);
     release_sample(&b);
     trip_octree_free(&b.octree);
     trip_output_close(&b.spool);

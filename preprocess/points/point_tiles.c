@@ -601,6 +601,25 @@ int trip_point_tiles_prepare(trip_point_tiles *t, unsigned thread, uint64_t tile
     return status;
 }
 
+static unsigned list_around(const trip_point_tiles *t, unsigned level, uint64_t at,
+                            const double p[3], uint64_t *out, unsigned count, unsigned room)
+{
+    child children[FAN];
+    const unsigned all = list_children(t, level, at, p, children);
+    for (unsigned i = 0; i < all && children[i].distance2 <= 0; i++)
+        if (level > 0)
+            count = list_around(t, level - 1, children[i].at, p, out, count, room);
+        else if (count < room)
+            out[count++] = children[i].at;
+    return count;
+}
+
+unsigned trip_point_tiles_around(const trip_point_tiles *t, const double position[3], uint64_t *out,
+                                 unsigned room)
+{
+    return list_around(t, t->levels - 1, 0, position, out, 0, room);
+}
+
 void trip_point_tiles_free(trip_point_tiles *t)
 {
     if (!t)

@@ -21,6 +21,7 @@ typedef struct trip_point_row {
     union {
         float scan;
         float uncertainty; /* of an ellipsoid, which has a normal */
+        float part;        /* of the tile, once normals are found (point_sides.h) */
     };
     float normal[3]; /* 0, 0, 0: none */
     float radius;    /* 0: none */
@@ -60,6 +61,10 @@ uint64_t trip_point_tiles_count(const trip_point_tiles *t);
 const trip_point_tile *trip_point_tiles_at(const trip_point_tiles *t, uint64_t tile);
 /* Reads the rows of a tile. Any thread. */
 int trip_point_tiles_read(const trip_point_tiles *t, uint64_t tile, trip_point_row *rows);
+
+/* Lists the tiles with bounds around a position, at most `room`, and returns their number. */
+unsigned trip_point_tiles_around(const trip_point_tiles *t, const double position[3], uint64_t *out,
+                                 unsigned room);
 
 /* Takes memory for searches by so many threads: up to half of the memory that is left. */
 int trip_point_tiles_begin_searches(trip_point_tiles *t, unsigned threads);
