@@ -363,7 +363,10 @@ static error_t parse_option(int key, char *arg, struct argp_state *state)
 }
 
 static const struct argp_option options[] = {
-    { "output", 'o', "FILE", 0, "Writes this file: .nrrd, .raw or .vdb (sparse)", 0 },
+    { "output", 'o', "FILE", 0,
+      "Writes this file: .nrrd, .raw or .vdb (sparse); .ply, .las or .json (a landscape); .ply (a "
+      "tree)",
+      0 },
     { "count", 'n', "N", 0,
       "Sets the number of Gaussians or points of a landscape or tree (default: 1000000), or of the "
       "copies in a scene file (default: 1000)",

@@ -604,7 +604,7 @@ static int give_surfels(void *user, trip_gaussian *out, size_t room, size_t *got
                        : b->tiles  ? next_of_tiles(b, out, room, got)
                                    : 0;
     if (status == 0 && *got == 0) {
-        release_tiles(b); /* what follows needs the memory and the disk */
+        release_tiles(b); /* the later passes need the memory and the disk */
         trip_output_close(&b->spool);
     }
     return status;

@@ -14,7 +14,7 @@ enum {
     FLAT_CELLS = 6, /* height of a cell in a flat box */
 };
 
-/* Radii grow by this factor beyond what the last search needed. */
+/* Radii grow by this factor over the radius of the last search. */
 #define BEYOND 1.25
 /* A bound for the rounding of distances. */
 #define ROUNDING 1e-9

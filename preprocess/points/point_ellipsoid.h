@@ -1,5 +1,5 @@
-/* Samples of range images as ellipsoids (Hofsetz and Max 2005, section 6). Pure functions. The paper
- * leaves the weight to a dissertation; this one is ours.
+/* Samples of range images as ellipsoids (Hofsetz and Max 2005, section 6). Pure functions. The
+ * paper leaves the weight to a dissertation; this one is ours.
  *
  * The third axis points to the camera. Its deviation is the uncertainty sigma of the distance
  * (range_shape.h). The other two deviations are half the width of a pixel at the distance. The

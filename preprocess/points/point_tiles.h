@@ -68,8 +68,8 @@ unsigned trip_point_tiles_around(const trip_point_tiles *t, const double positio
 
 /* Takes memory for searches by so many threads: up to half of the memory that is left. */
 int trip_point_tiles_begin_searches(trip_point_tiles *t, unsigned threads);
-/* Prepares fast searches by a thread for the positions of a tile, whose rows were read. Without it,
- * searches give the same neighbours. */
+/* Prepares a thread for fast searches from the positions of a tile. The caller has read the rows
+ * of the tile. Searches without this call find the same neighbours. */
 int trip_point_tiles_prepare(trip_point_tiles *t, unsigned thread, uint64_t tile,
                              const trip_point_row *rows, unsigned wanted);
 /* Finds the nearest neighbours of n->position, which lies in a tile. Each thread has a number of

@@ -359,7 +359,7 @@ bool trip_range_is_json(const unsigned char *head, unsigned long count)
            memmem(head, count, "\"transform_matrix\"", strlen("\"transform_matrix\""));
 }
 
-/* The members that describe a camera. A frame has its own, or those of the file. */
+/* Where the members are that describe a camera: in a frame, or else in the file. */
 typedef struct json_frame {
     const char *path; /* of the file */
     const cJSON *root, *frame;

@@ -7,8 +7,9 @@
 
 enum { SWEEPS = 12, NEWTON_STEPS = 12 };
 
-/* Of the sum of the variances: the last step, and the distance of the lower two for precision. */
+/* Newton's method ends with a step of this part of the sum of the variances. */
 #define NEWTON_LAST 1e-14
+/* The result is precise if the two lower variances differ by this part of the sum. */
 #define APART 0.01
 
 /* A matrix is diagonal if the other values are at most this part of its diagonal. */

@@ -21,8 +21,8 @@
  *     o' = (1 - (1 - min(0.99, o))^opacity_scale) m,   m = sqrt(max(0.000025, |J S J^T| / |S2|))
  *     alpha(p) = min(0.99, o' exp(-q / 2)),  q = d^T S2^-1 d,  d = p - (X, Y)
  *
- * With opacity_scale 1, o' is o m. For scenes that are not antialiased, m is 1. An alpha below 1/255
- * counts as 0. No other bound cuts the footprint off.
+ * With opacity_scale 1, o' is o m. For scenes that are not antialiased, m is 1. An alpha below
+ * 1/255 counts as 0. No other bound cuts the footprint off.
  *
  * With the exact footprint, J is not limited. Let R and s be the rotation and the deviations, r(p)
  * the ray through p, and V = diag(s2 s3, s1 s3, s1 s2) R^T. Then:
@@ -38,8 +38,8 @@
  * keeps the footprint's mass.
  *
  * A sample of a range image counts less from other directions than from its camera (Hofsetz and Max
- * 2005, section 6). o' has the factor max(0, cos)^4 of the angle between two rays to the centre:
- * from the eye and from the camera. Coarse Gaussians have no such factor.
+ * 2005, section 6). Let c be the cosine of the angle at the centre between the rays from the eye
+ * and from the camera. o' has the factor max(0, c)^4. Coarse Gaussians have no such factor.
  *
  * A footprint that reaches TRIP_GAUSSIAN_REACH_MAX is left out.
  *

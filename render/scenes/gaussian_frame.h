@@ -1,4 +1,4 @@
-/* Draws one picture of placed Gaussian scenes or clouds of points, in steps: streams their
+/* Draws one picture of placed Gaussian scenes or clouds of points, in steps. It streams their
  * Gaussians in the order of drawing, composites them into layers, and merges the layers.
  *
  * - The order by depth has one layer. Its Gaussians come in the order of the centres' view depth.

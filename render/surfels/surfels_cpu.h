@@ -24,8 +24,8 @@ typedef struct trip_surfels_cpu_params {
     const trip_gaussian_settings *settings; /* copied, but not the light */
     trip_budget *budget;
     const trip_task_runner *runner; /* NULL for no threads */
-    /* Without selection: all surfels are blended, as in section 3 of the paper. Only for
-     * comparisons of time. No surfel is skipped, and the sums depend on the order. */
+    /* Blends all surfels without selection, as in section 3 of the paper, to compare the times.
+     * The renderer then skips no surfel. The sums depend on the order. */
     bool unselected;
 } trip_surfels_cpu_params;
 

@@ -68,7 +68,7 @@ class Deferred(program.ProgramTest):
         self.assertTrue((picture[:, :, 3] == 1).all())
         far = 255 * abs(picture[:, :, :2] - 100 / 255)
         self.assertLess(far.mean(), 25)
-        # by depth, a pixel shows the scan whose point happens to be nearer
+        # by depth, each pixel shows the scan with the nearer point there
         self.assertGreater((255 * abs(self.picture("scans.ply", *view, "--order", "depth")[:, :, :2] -
                                       100 / 255)).mean(), 2 * far.mean())
 

@@ -1,6 +1,6 @@
-/* Fuzzes the descriptions of range images. The first byte chooses what the rest is:
- * transforms.json, a pose, or the intrinsics of a camera. The images are there, but are not read.
- * All numbers of an accepted frame must be finite. */
+/* Fuzzes the descriptions of range images. The first byte chooses the file that holds the other
+ * bytes: transforms.json, a pose, or the intrinsics of a camera. The images exist, and stay unread.
+ * All numbers of an accepted frame must be finite, except a centre that is not given. */
 #include "fuzz.h"
 
 #include <math.h>

@@ -387,7 +387,7 @@ static void order_and_batches_change_no_bit(void **state)
     expect_same((way){ .batch = 700, .backwards = true, .threads = 3 });
 }
 
-/* Where each surfel has a pixel of its own and none is hidden, selection leaves none out. */
+/* Selection keeps all surfels if each has a pixel of its own and none is hidden. */
 static void selection_keeps_all_surfels_that_can_be_told_apart(void **state)
 {
     (void)state;
