@@ -250,8 +250,9 @@ template <typename TreeT> class TypedGrid : public trip_vdb_grid
         for (openvdb::Index i = 0; i < children; i++) {
             auto child = std::make_unique<TopT>(openvdb::PartialCreate(), is.get_value<Coord>(),
                                                 root_.background());
-            child->readTopology(is, half_);
-            root_.addChild(child.release());
+            TopT *node = child.release(); /* unreadable, it cannot be freed: see vdb_tree_check.h */
+            node->readTopology(is, half_);
+            root_.addChild(node);
         }
     }
 

@@ -1,11 +1,13 @@
 /* Checks a grid's tree in its file and computes its memory before the library builds it. The
- * library allocates the nodes of a tree of any size, and writes beyond its buffers if a chunk gives
- * a wrong size. The check reads with the library's own functions, in the mode that skips values.
- * Only vdb_grid.cpp includes this. */
+ * library allocates the nodes of a tree of any size, writes beyond its buffers if a chunk gives a
+ * wrong size, and frees random addresses if a node's values cannot be decompressed. The check reads
+ * each node's values once with the library's own functions and skips those of leaves. Only
+ * vdb_grid.cpp includes this. */
 #ifndef TRIP_VDB_TREE_CHECK_H
 #define TRIP_VDB_TREE_CHECK_H
 
 #include <cstdlib>
+#include <memory>
 #include <set>
 
 #include <openvdb/openvdb.h>
@@ -140,9 +142,14 @@ template <typename TreeT> class trip_vdb_tree_check
         return same;
     }
 
+    /* Skips the values first, which checks the size of their chunk. */
     template <typename MaskT> void check_values(openvdb::Index count, const MaskT &mask)
     {
+        int64_t start = is_.tellg();
         skip_values(is_, count, mask, half_);
+        is_.seekg(start);
+        std::unique_ptr<ValueT[]> values(new ValueT[count]);
+        openvdb::io::readCompressedValues(is_, values.get(), count, mask, half_);
     }
 
     trip_vdb_stream &is_;
