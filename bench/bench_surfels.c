@@ -169,7 +169,7 @@ static int draw(const run *r, int scene, bool selects, const trip_camera *camera
         status = trip_surfel_frame_step(f, UINT64_MAX);
     while (status == TRIP_FRAME_MORE);
     if (!status)
-        trip_surfel_frame_picture(f, r->rgba, NULL);
+        status = trip_surfel_frame_picture(f, r->rgba, NULL);
     to->stats = trip_surfel_frame_get_stats(f);
     trip_surfel_frame_end(f);
     if (frame >= 0)

@@ -99,8 +99,6 @@ static const struct rule {
       "does not apply to --renderer integral, which has no order", IDLE },
     { ROW(ORDER), RENDERER(GL), BY_SHEETS, 0, "sheets requires --renderer cpu or reference",
       CONFLICT },
-    { ROW(ORDER), RENDERER(GL), DEFERRED, 0, "deferred requires --renderer cpu or reference",
-      CONFLICT },
     { ROW(FOOTPRINT) | ROW(EARLY_TERMINATION), ALL, DEFERRED, 0,
       "does not apply to --order deferred, which blends at each pixel what is nearest", CONFLICT },
     { ROW(SHEET), ALL, 0, BY_SHEETS, "requires --order sheets", IDLE },

@@ -288,7 +288,7 @@ static bool is_flat(const triptych *t)
 static triptych_order order_of(const triptych *t)
 {
     const triptych_renderer r = t->resources.renderer;
-    const bool defers = kind_of(t) == DRAW_KIND_CLOUD && is_flat(t) && r != TRIPTYCH_RENDERER_GL &&
+    const bool defers = kind_of(t) == DRAW_KIND_CLOUD && is_flat(t) &&
                         r != TRIPTYCH_RENDERER_INTEGRAL && !blends(t);
     return t->given.scene.order ? t->given.scene.order
            : defers             ? TRIPTYCH_ORDER_DEFERRED
@@ -451,6 +451,12 @@ static const trip_tile_device *device_of(const triptych *t)
     return t->device_renderer ? t->device_renderer->ops->tile_device(t->device_renderer) : NULL;
 }
 
+/* Returns the device for deferred pictures, or NULL. */
+static const trip_surfel_device *surfel_device_of(const triptych *t)
+{
+    return t->device_renderer ? t->device_renderer->ops->surfel_device(t->device_renderer) : NULL;
+}
+
 /* Returns the width of voxels in pixels that coarse Gaussians may stand for. */
 static double lod_of(const triptych *t)
 {
@@ -505,6 +511,7 @@ int trip_context_begin_scene(triptych *t)
         .history = &t->surfel_history,
         .tolerance = t->given.integral.tolerance,
         .device = device_of(t),
+        .surfel_device = surfel_device_of(t),
         .budget = t->session.budget,
         .runner = trip_renderer_runner(t->renderer),
     };

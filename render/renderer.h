@@ -17,6 +17,7 @@ struct trip_field;
 struct trip_light_map;
 struct trip_emission;
 struct trip_tile_device;
+struct trip_surfel_device;
 
 /* Counts of one list in one frame. Splats near the eye's coordinate that belong to both passes
  * (plan.h) count once per pass. `post` projects no splats and counts 0. */
@@ -136,6 +137,8 @@ typedef struct trip_renderer_ops {
     /* Returns the device that composites the tiles of Gaussian scenes (gaussian_tiles.h). The
      * renderer owns it. NULL if the renderer has none. */
     const struct trip_tile_device *(*tile_device)(trip_renderer *r);
+    /* Returns the device for deferred pictures (surfel_device.h), likewise. */
+    const struct trip_surfel_device *(*surfel_device)(trip_renderer *r);
     /* Returns the counts of a list, by its index in the data set, after picture(). The caller
      * counts bytes_read. */
     trip_list_stats (*stats)(const trip_renderer *r, unsigned list);

@@ -23,6 +23,7 @@
 #include "gl/resident.h"
 #include "gl/ring.h"
 #include "gl/gl_sheets.h"
+#include "gl/gl_surfels.h"
 #include "gl/gl_tiles.h"
 #include "gl/slots.h"
 #include "gl/sums.h"
@@ -62,6 +63,7 @@ typedef struct gl_renderer {
     trip_gl_sheets sheets;     /* only for `post` */
     trip_gl_sums sums;         /* only for frames that composite sheet by sheet */
     trip_gl_tiles tiles;       /* only for Gaussian scenes */
+    trip_gl_surfels surfels;   /* only for deferred pictures */
     const trip_frame *frame;
     bool in_layer;          /* some sheets of the current layer may not be drawn yet */
     int axis;               /* of the current layer */
@@ -692,6 +694,11 @@ static const trip_tile_device *tile_device(trip_renderer *base)
     return &((gl_renderer *)base)->tiles.device;
 }
 
+static const trip_surfel_device *surfel_device(trip_renderer *base)
+{
+    return &((gl_renderer *)base)->surfels.device;
+}
+
 static trip_list_stats stats(const trip_renderer *base, unsigned list)
 {
     return ((const gl_renderer *)base)->stats[list];
@@ -719,6 +726,7 @@ static const trip_renderer_ops gl_ops = {
     .picture = picture,
     .end_frame = end_frame,
     .tile_device = tile_device,
+    .surfel_device = surfel_device,
     .stats = stats,
 };
 
@@ -799,6 +807,8 @@ int trip_gl_create(trip_renderer **out, trip_budget *budget)
     }
     r->tiles = (trip_gl_tiles){ r->context, &r->queue, &r->variants, { 0 } };
     trip_gl_tiles_set_up(&r->tiles);
+    r->surfels = (trip_gl_surfels){ r->context, &r->queue, &r->variants, { 0 } };
+    trip_gl_surfels_set_up(&r->surfels);
     r->base.software = r->target.software = trip_gl_context_limits(r->context)->software;
     describe(r);
     *out = &r->base;

@@ -38,6 +38,10 @@
 #define TRIP_GL_TILE_CURVES 3
 #define TRIP_GL_TILE_PAIRS 4
 #define TRIP_GL_TILE_JOBS 5
+/* Reused for surfels. */
+#define TRIP_GL_SURFELS 0
+#define TRIP_GL_SURFEL_PLACES 1
+#define TRIP_GL_SURFEL_CELLS 2
 /* Texture units. The layer of axis a uses unit a, its depths unit 3 + a. */
 #define TRIP_GL_LAYER 0
 #define TRIP_GL_LAYER_DEPTH 3
@@ -47,10 +51,17 @@
 #define TRIP_GL_LIGHT_OPEN 9
 #define TRIP_GL_HEAT 10
 #define TRIP_GL_SHEET_DEVIATIONS 11
+#define TRIP_GL_SURFEL_DEPTHS 0
+#define TRIP_GL_SURFEL_HOLDERS 1
 /* Image units. */
 #define TRIP_GL_IMAGE 0 /* a layer or a sheet */
 #define TRIP_GL_IMAGE_DEPTH 1
 #define TRIP_GL_IMAGE_DEVIATIONS 1
+#define TRIP_GL_SURFEL_IMAGE_DEPTHS 0
+#define TRIP_GL_SURFEL_IMAGE_FRONTS 1
+#define TRIP_GL_SURFEL_IMAGE_NUMBERS 2
+#define TRIP_GL_SURFEL_IMAGE_HOLDERS 3
+#define TRIP_GL_SURFEL_IMAGE_BLOCKS 4
 /* Outputs of a layer and of the merged picture. Depths exist only with settings.depth. */
 #define TRIP_GL_OUT_COLOUR 0
 #define TRIP_GL_OUT_DEPTH 1
@@ -67,6 +78,11 @@
 #define TRIP_GL_TILE_PICTURE 1
 #define TRIP_GL_TILE_TERMINATION 2
 #define TRIP_GL_TILE_FIRST_JOB 3
+#define TRIP_GL_SURFEL_PICTURE 0
+#define TRIP_GL_SURFEL_FIRST 1
+#define TRIP_GL_SURFEL_COUNT 2
+#define TRIP_GL_SURFEL_STAGE 3
+#define TRIP_GL_SURFEL_PITCH 4
 /* Codes of missing voxels in a sheet, for whole codes and for exact draw codes. */
 #define TRIP_GL_MISSING_WHOLE -1.0
 #define TRIP_GL_MISSING_EXACT -3e38
@@ -76,6 +92,13 @@
 /* Side of a tile of a Gaussian scene in pixels, TRIP_TILE_PX, and its pixels. */
 #define TRIP_GL_TILE_PX 16
 #define TRIP_GL_TILE_PIXELS 256
+/* The cell of a surfel that is not drawn, TRIP_SURFEL_NO_CELL, and vectors of a surfel. */
+#define TRIP_GL_NO_CELL 0xffffffffu
+#define TRIP_GL_SURFEL_LAYERS 5
+/* Pixels along each side of a block of depths, level 0 of depth_pyramid.h. */
+#define TRIP_GL_SURFEL_BLOCK 8
+/* Invocations of a work group over surfels. */
+#define TRIP_GL_SURFEL_GROUP 64
 /* Invocations of a work group in the counting pass. */
 #define TRIP_GL_COUNT_GROUP 64
 /* Invocations along each side of a work group over a sheet or a picture. */
@@ -324,6 +347,11 @@ struct trip_gl_projected {
 struct trip_gl_curve {
     TRIP_GL_VEC4 w_a_b; /* w, a, b, turn */
     TRIP_GL_VEC4 steps; /* bend_x, bend_y, tilt, skew */
+};
+
+/* A projected surfel. surfel.glsl names its vectors. */
+struct trip_gl_surfel {
+    TRIP_GL_VEC4 at[TRIP_GL_SURFEL_LAYERS];
 };
 
 /* A tile to draw: its number in the band, its first pair, and their number. */

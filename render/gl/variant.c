@@ -12,6 +12,7 @@
 #include "shade.h"
 #include "sheet.h"
 #include "splat.h"
+#include "surfel_picture.h"
 #include "text.h"
 
 static const struct {
@@ -41,6 +42,12 @@ static const struct {
                                   false },
     [TRIP_GL_PASS_TILES] = { NULL, NULL, "tiles.comp", TRIP_GL_DEPTH | TRIP_GL_CURVED, false },
     [TRIP_GL_PASS_TILE_CLEAR] = { NULL, NULL, "tile_clear.comp", TRIP_GL_DEPTH, false },
+    [TRIP_GL_PASS_SURFEL_DEPTH] = { "surfel_depth.vert", "surfel_depth.frag", NULL,
+                                    TRIP_GL_PARALLEL, false },
+    [TRIP_GL_PASS_SURFEL_SELECT] = { NULL, NULL, "surfel_select.comp", 0, false },
+    [TRIP_GL_PASS_SURFEL_BLOCKS] = { NULL, NULL, "surfel_blocks.comp", 0, false },
+    [TRIP_GL_PASS_SURFEL_BLEND] = { "surfel_blend.vert", "surfel_blend.frag", NULL,
+                                    TRIP_GL_PARALLEL, false },
 };
 
 static void write_effects(FILE *out, unsigned effects)
@@ -81,6 +88,8 @@ static void write_defines(FILE *out, const trip_gl_variant *variant)
     if (variant->pass == TRIP_GL_PASS_TILES)
         fprintf(out, "#define ALPHA_MIN %.9f\n#define ALPHA_MAX %.9f\n", TRIP_GAUSSIAN_ALPHA_MIN,
                 TRIP_GAUSSIAN_ALPHA_MAX);
+    if (variant->pass >= TRIP_GL_PASS_SURFEL_DEPTH)
+        fprintf(out, "#define RIM %.9g\n#define REACH %.9f\n", TRIP_SURFEL_RIM, TRIP_SURFEL_REACH);
     if (variant->effects & TRIP_GL_WIDE)
         fprintf(out, "#define CUBIC %d\n#define CUTOFF %.9f\n", (int)TRIP_KERNEL_CUBIC,
                 TRIP_CUTOFF);
@@ -110,6 +119,7 @@ static int build(const trip_gl_variant *variant, GLuint *program)
                                           });
 }
 
+static_assert(TRIP_GL_PASS_SURFEL_BLEND < 1 << 4, "a pass is 4 bits of a key");
 static_assert(TRIP_GL_EFFECT_SETS <= 1 << 30, "effects are 32 bits of a key");
 static uint64_t key_of(const trip_gl_variant *v)
 {

@@ -20,6 +20,10 @@ typedef enum trip_gl_pass {
     TRIP_GL_PASS_SHEET_DRAW,
     TRIP_GL_PASS_TILES,
     TRIP_GL_PASS_TILE_CLEAR,
+    TRIP_GL_PASS_SURFEL_DEPTH,
+    TRIP_GL_PASS_SURFEL_SELECT,
+    TRIP_GL_PASS_SURFEL_BLOCKS,
+    TRIP_GL_PASS_SURFEL_BLEND,
 } trip_gl_pass;
 
 typedef struct trip_gl_variant {

@@ -349,6 +349,7 @@ static int begin_surfels(trip_gaussian_frame *f)
                                                                 .lod_px = p->lod_px,
                                                                 .reference = p->reference,
                                                                 .history = p->history,
+                                                                .device = p->surfel_device,
                                                                 .budget = p->budget,
                                                                 .runner = p->runner });
 }
@@ -563,7 +564,7 @@ int trip_gaussian_frame_picture(trip_gaussian_frame *f, float *rgba, float *dept
     else if (f->sheets)
         trip_gaussian_sheet_frame_picture(f->sheets, rgba, depth);
     else if (f->surfels)
-        trip_surfel_frame_picture(f->surfels, rgba, depth);
+        status = trip_surfel_frame_picture(f->surfels, rgba, depth);
     else
         status = f->params.by_lists ? merge(f, rgba, depth) : take_layer(f->layers, rgba, depth);
     f->stats.merge_ms += trip_now_ms() - begun;

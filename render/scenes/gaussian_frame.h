@@ -40,8 +40,9 @@ typedef struct trip_gaussian_frame_params {
     bool deferred;                /* has none either */
     trip_surfel_history *history; /* of deferred pictures, see trip_surfel_frame_params */
     double tolerance;             /* of the integral; 0 means the default */
-    /* Composites in place of the CPU; NULL for none. It must outlive the frame. */
+    /* Draw in place of the CPU; NULL for none. They must outlive the frame. */
     const trip_tile_device *device;
+    const trip_surfel_device *surfel_device;
     trip_budget *budget;
     trip_task_runner runner;
 } trip_gaussian_frame_params;

@@ -95,13 +95,18 @@ static void refresh_level(trip_depth_pyramid *p, int level)
         }
 }
 
+void trip_depth_pyramid_refresh_above(trip_depth_pyramid *p)
+{
+    for (int level = 1; level < p->levels; level++)
+        refresh_level(p, level);
+}
+
 void trip_depth_pyramid_refresh(trip_depth_pyramid *p, const uint32_t *depths,
                                 const trip_task_runner *runner)
 {
     refreshing r = { p, depths };
     trip_run_tasks(runner, refresh_row, &r, (unsigned)p->rows[0]);
-    for (int level = 1; level < p->levels; level++)
-        refresh_level(p, level);
+    trip_depth_pyramid_refresh_above(p);
 }
 
 /* ---- queries ---- */

@@ -38,6 +38,9 @@ static inline void trip_depth_pyramid_mark(trip_depth_pyramid *p, int x, int y)
 void trip_depth_pyramid_refresh(trip_depth_pyramid *p, const uint32_t *depths,
                                 const trip_task_runner *runner);
 
+/* Takes over level 0, which the caller has written to greatest[0]. */
+void trip_depth_pyramid_refresh_above(trip_depth_pyramid *p);
+
 /* Returns whether all depths of a rectangle of pixels, inclusive and inside the picture, were less
  * than `depth` at the last refresh. Any thread. */
 bool trip_depth_pyramid_is_before(const trip_depth_pyramid *p, int left, int top, int right,

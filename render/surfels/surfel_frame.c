@@ -89,6 +89,7 @@ static int begin_picture(trip_surfel_frame *f)
                                                               .settings = &p->settings,
                                                               .budget = p->budget,
                                                               .runner = &p->runner,
+                                                              .device = p->device,
                                                               .unselected = p->unselected });
 }
 
@@ -357,15 +358,18 @@ static void keep_history(trip_surfel_frame *f)
     f->kept = true;
 }
 
-void trip_surfel_frame_picture(trip_surfel_frame *f, float *rgba, float *depth)
+int trip_surfel_frame_picture(trip_surfel_frame *f, float *rgba, float *depth)
 {
     const double begun = trip_now_ms();
+    int status = 0;
     if (f->cpu)
-        trip_surfels_cpu_picture(f->cpu, rgba, depth);
+        status = trip_surfels_cpu_picture(f->cpu, rgba, depth);
     else
         trip_surfels_reference_picture(f->reference, rgba, f->params.settings.depth ? depth : NULL);
-    keep_history(f);
+    if (!status)
+        keep_history(f);
     f->stats.blend_ms += trip_now_ms() - begun;
+    return status;
 }
 
 trip_surfel_frame_stats trip_surfel_frame_get_stats(const trip_surfel_frame *f)

@@ -7,6 +7,7 @@
 
 #include "gaussian_picture.h"
 #include "placed_stream.h"
+#include "surfel_device.h"
 #include "surfel_plan.h"
 #include "task_runner.h"
 
@@ -24,7 +25,8 @@ typedef struct trip_surfel_frame_params {
     /* Bricks of an earlier picture of the same sets. The complete picture replaces them. It must
      * outlive the frame; NULL: none. */
     trip_surfel_history *history;
-    bool unselected; /* blends all surfels, and reads them twice (surfels_cpu.h) */
+    const trip_surfel_device *device; /* as in trip_surfels_cpu_params */
+    bool unselected;                  /* blends all surfels, and reads them twice (surfels_cpu.h) */
     trip_budget *budget;
     trip_task_runner runner;
 } trip_surfel_frame_params;
@@ -49,7 +51,7 @@ int trip_surfel_frame_begin(trip_surfel_frame **out, const trip_surfel_frame_par
  * TRIP_FRAME_MORE (renderer.h), or a failure. */
 int trip_surfel_frame_step(trip_surfel_frame *f, uint64_t deadline_ns);
 /* Writes the picture drawn so far, as trip_surfels_cpu_picture() does. */
-void trip_surfel_frame_picture(trip_surfel_frame *f, float *rgba, float *depth);
+int trip_surfel_frame_picture(trip_surfel_frame *f, float *rgba, float *depth);
 trip_surfel_frame_stats trip_surfel_frame_get_stats(const trip_surfel_frame *f);
 void trip_surfel_frame_end(trip_surfel_frame *f); /* NULL is allowed */
 

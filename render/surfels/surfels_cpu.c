@@ -18,7 +18,6 @@ enum {
     STRIP = 16, /* rows of pixels of a task */
 };
 
-#define NO_CELL UINT32_MAX
 #define NO_KEY UINT64_MAX
 
 /* The bounds of the pixels that the visible surfels of a row of cells reach. */
@@ -27,10 +26,8 @@ typedef struct row_reach {
     uint64_t visible;
 } row_reach;
 
-/* The sums of a pixel. Blending divides them in place. */
-typedef struct sum {
-    float rgb[3], tolerance, weight, coverage;
-} sum;
+/* Blending divides the sums in place. */
+typedef trip_surfel_sum sum;
 
 struct trip_surfels_cpu {
     trip_camera camera;
@@ -45,10 +42,14 @@ struct trip_surfels_cpu {
     sum *sums;
     row_reach *reaches;
     trip_depth_pyramid pyramid;
+    /* On a device, `keys` holds the fronts of all cells, then their numbers. */
+    const trip_surfel_device *device;
+    trip_surfel_target *target;
+    uint32_t *fronts, *numbers;
 
     size_t batch_max;
     trip_surfel_projected *batch;
-    uint32_t *batch_cells; /* NO_CELL: skipped */
+    uint32_t *batch_cells; /* TRIP_SURFEL_NO_CELL: skipped */
     uint32_t *batch_numbers;
     trip_surfel_getter *get;
     const void *context;
@@ -61,12 +62,12 @@ struct trip_surfels_cpu {
 
 /* ---- memory ---- */
 
-/* The fields of `s` that are buffers, and their sizes in bytes. */
+/* The fields of `s` that are buffers, and their sizes in bytes. A device has its own holders. */
 #define BUFFERS(X)                                                                                 \
     X(s->depths, s->pixels * sizeof(uint32_t))                                                     \
     X(s->sums, s->pixels * sizeof(sum))                                                            \
     X(s->keys, s->cells * sizeof(uint64_t))                                                        \
-    X(s->holders, s->cells * sizeof(trip_surfel_projected))                                        \
+    X(s->holders, s->device ? 1 : s->cells * sizeof(trip_surfel_projected))                        \
     X(s->reaches, (size_t)s->cell_rows * sizeof(row_reach))                                        \
     X(s->batch, s->batch_max * sizeof(trip_surfel_projected))                                      \
     X(s->batch_cells, s->batch_max * sizeof(uint32_t))                                             \
@@ -80,7 +81,8 @@ static void release_buffers(trip_surfels_cpu *s)
     trip_depth_pyramid_end(&s->pyramid, s->budget);
 }
 
-static bool take_buffers(trip_surfels_cpu *s, size_t batch_max)
+/* Returns 0, a failure (reported), or 1 if the budget refuses (not reported). */
+static int take_buffers(trip_surfels_cpu *s, size_t batch_max)
 {
     bool all = true;
     s->batch_max = batch_max;
@@ -89,17 +91,25 @@ static bool take_buffers(trip_surfels_cpu *s, size_t batch_max)
 #undef TAKE
     all =
         all && trip_depth_pyramid_begin(&s->pyramid, s->camera.width, s->camera.height, s->budget);
-    if (!all)
+    const trip_surfel_target_params params = { .width = s->camera.width,
+                                               .height = s->camera.height,
+                                               .ortho = s->camera.ortho,
+                                               .batch_max = batch_max,
+                                               .budget = s->budget };
+    const int status = !all        ? 1
+                       : s->device ? s->device->begin(s->device->user, &s->target, &params)
+                                   : 0;
+    if (status)
         release_buffers(s);
-    return all;
+    return status;
 }
 
-static bool take_what_fits(trip_surfels_cpu *s)
+static int take_what_fits(trip_surfels_cpu *s)
 {
-    bool all = false;
-    for (size_t batch = BATCH_MAX; batch >= BATCH_MIN && !all; batch /= 2)
-        all = take_buffers(s, batch);
-    return all;
+    int status = 1;
+    for (size_t batch = BATCH_MAX; batch >= BATCH_MIN && status > 0; batch /= 2)
+        status = take_buffers(s, batch);
+    return status;
 }
 
 static uint32_t bits_of(float f)
@@ -120,29 +130,35 @@ int trip_surfels_cpu_begin(trip_surfels_cpu **out, const trip_surfels_cpu_params
 {
     const trip_camera *c = params->camera;
     trip_surfels_cpu *s = *out = trip_budget_take(params->budget, sizeof *s);
-    bool all = s != NULL;
-    if (all) {
+    int status = s ? 0 : 1;
+    if (s) {
         *s = (trip_surfels_cpu){
             .camera = *c,
             .settings = *params->settings,
             .budget = params->budget,
             .runner = params->runner ? *params->runner : (trip_task_runner){ 0 },
+            .device = params->device,
             .unselected = params->unselected,
             .pixels = (size_t)c->width * (size_t)c->height,
             .pitch = c->width + 2 * TRIP_SURFEL_GUARD,
             .cell_rows = c->height + 2 * TRIP_SURFEL_GUARD,
         };
         s->cells = (size_t)s->pitch * (size_t)s->cell_rows;
-        all = s->cells < NO_CELL && take_what_fits(s);
+        status = s->cells < TRIP_SURFEL_NO_CELL ? take_what_fits(s) : 1;
     }
-    if (!all) {
+    if (status) {
         trip_budget_release(params->budget, s, sizeof *s);
         *out = NULL;
+    }
+    if (status < 0)
+        return status;
+    if (status)
         return trip_fail(TRIP_ERROR, "render", "memory",
                          "a picture of %d x %d px does not fit; raise --memory or draw a smaller "
                          "picture",
                          c->width, c->height);
-    }
+    s->fronts = (uint32_t *)s->keys;
+    s->numbers = s->fronts + s->cells;
     for (size_t i = 0; i < s->pixels; i++)
         s->depths[i] = bits_of(INFINITY);
     memset(s->keys, 0xff, s->cells * sizeof *s->keys);
@@ -153,6 +169,8 @@ void trip_surfels_cpu_end(trip_surfels_cpu *s)
 {
     if (!s)
         return;
+    if (s->target)
+        s->device->end(s->target);
     release_buffers(s);
     trip_budget_release(s->budget, s, sizeof *s);
 }
@@ -232,7 +250,7 @@ static void project(trip_surfels_cpu *s, size_t i, skipped *skip)
     trip_surfel_footprint f;
     trip_gaussian g;
     trip_surfel_projected *p = &s->batch[i];
-    s->batch_cells[i] = NO_CELL;
+    s->batch_cells[i] = TRIP_SURFEL_NO_CELL;
     s->batch_numbers[i] = s->get(s->context, s->from + i, &g);
     if (!trip_surfel_footprint_of(&s->camera, &s->settings, &g, &f)) {
         skip->outside++;
@@ -253,7 +271,7 @@ static void project(trip_surfels_cpu *s, size_t i, skipped *skip)
     const int column = trip_surfel_cell(f.x, s->camera.width) + TRIP_SURFEL_GUARD;
     const int row = trip_surfel_cell(f.y, s->camera.height) + TRIP_SURFEL_GUARD;
     s->batch_cells[i] = (uint32_t)row * (uint32_t)s->pitch + (uint32_t)column;
-    if (s->blending)
+    if (s->blending || s->device)
         return;
     lower_depths(s, p);
     lower_key(s, s->batch_cells[i], key_of(p, s->batch_numbers[i]));
@@ -271,6 +289,16 @@ static void project_some(void *context, unsigned task)
     __atomic_fetch_add(&s->hidden, skip.hidden, __ATOMIC_RELAXED);
 }
 
+/* Draws the batch on the device. */
+static int add_to_device(trip_surfels_cpu *s)
+{
+    const trip_surfel_batch batch = { s->batch, s->batch_cells, s->batch_numbers, s->count };
+    const int status = s->device->add(s->target, &batch, s->pyramid.greatest[0]);
+    if (!status)
+        trip_depth_pyramid_refresh_above(&s->pyramid);
+    return status;
+}
+
 /* Each cell has one holder, since no number occurs twice. */
 static void write_some(void *context, unsigned task)
 {
@@ -279,7 +307,8 @@ static void write_some(void *context, unsigned task)
     const size_t end = begin + TASK < s->count ? begin + TASK : s->count;
     for (size_t i = begin; i < end; i++) {
         const uint32_t cell = s->batch_cells[i];
-        if (cell != NO_CELL && s->keys[cell] == key_of(&s->batch[i], s->batch_numbers[i]))
+        if (cell != TRIP_SURFEL_NO_CELL &&
+            s->keys[cell] == key_of(&s->batch[i], s->batch_numbers[i]))
             s->holders[cell] = s->batch[i];
     }
 }
@@ -297,20 +326,23 @@ static int project_all(trip_surfels_cpu *s, trip_surfel_getter *get, const void 
 {
     s->get = get;
     s->context = context;
-    for (s->from = 0; s->from < count; s->from += s->count) {
-        const int status = trip_frame_poll();
+    int status = 0;
+    for (s->from = 0; s->from < count && !status; s->from += s->count) {
+        status = trip_frame_poll();
         if (status)
             return status;
         s->count = count - s->from < s->batch_max ? count - s->from : s->batch_max;
         trip_run_tasks(&s->runner, project_some, s, tasks_for(s->count, TASK));
         if (s->blending) {
             trip_run_tasks(&s->runner, blend_batch, s, tasks_for((size_t)s->camera.height, STRIP));
-            continue;
+        } else if (s->device) {
+            status = add_to_device(s);
+        } else {
+            trip_run_tasks(&s->runner, write_some, s, tasks_for(s->count, TASK));
+            trip_depth_pyramid_refresh(&s->pyramid, s->depths, &s->runner);
         }
-        trip_run_tasks(&s->runner, write_some, s, tasks_for(s->count, TASK));
-        trip_depth_pyramid_refresh(&s->pyramid, s->depths, &s->runner);
     }
-    return 0;
+    return status;
 }
 
 int trip_surfels_cpu_add_from(trip_surfels_cpu *s, trip_surfel_getter *get, const void *context,
@@ -358,10 +390,20 @@ static void divide(sum *at)
     at->tolerance /= at->weight;
 }
 
+static size_t cell_at(const trip_surfels_cpu *s, int row, int column)
+{
+    return (size_t)row * (size_t)s->pitch + (size_t)column;
+}
+
+static uint64_t key_at(const trip_surfels_cpu *s, size_t cell)
+{
+    return s->device ? (uint64_t)s->fronts[cell] << 32 | s->numbers[cell] : s->keys[cell];
+}
+
 /* Returns whether a cell holds a visible surfel. */
 static bool is_visible(const trip_surfels_cpu *s, int row, int column)
 {
-    const uint64_t key = s->keys[(size_t)row * (size_t)s->pitch + (size_t)column];
+    const uint64_t key = key_at(s, cell_at(s, row, column));
     const int x = trip_surfel_pixel(column - TRIP_SURFEL_GUARD, s->camera.width);
     const int y = trip_surfel_pixel(row - TRIP_SURFEL_GUARD, s->camera.height);
     return key != NO_KEY &&
@@ -370,7 +412,7 @@ static bool is_visible(const trip_surfels_cpu *s, int row, int column)
 
 static const trip_surfel_projected *holder(const trip_surfels_cpu *s, int row, int column)
 {
-    return &s->holders[(size_t)row * (size_t)s->pitch + (size_t)column];
+    return &s->holders[cell_at(s, row, column)];
 }
 
 static void bound_row(void *context, unsigned row)
@@ -439,8 +481,6 @@ static void blend_strip(void *context, unsigned strip)
             if (is_visible(s, row, column))
                 blend(s, holder(s, row, column), top, end);
     }
-    for (size_t i = 0; i < count; i++)
-        divide(&sums[i]);
 }
 
 static void blend_batch(void *context, unsigned strip)
@@ -449,7 +489,7 @@ static void blend_batch(void *context, unsigned strip)
     const int top = (int)strip * STRIP;
     const int end = top + STRIP < s->camera.height ? top + STRIP : s->camera.height;
     for (size_t i = 0; i < s->count; i++)
-        if (s->batch_cells[i] != NO_CELL)
+        if (s->batch_cells[i] != TRIP_SURFEL_NO_CELL)
             blend(s, &s->batch[i], top, end);
 }
 
@@ -463,6 +503,38 @@ int trip_surfels_cpu_blend_from(trip_surfels_cpu *s, trip_surfel_getter *get, co
     const int status = project_all(s, get, context, count);
     s->stats.blend_ns += trip_now_ns() - began;
     return status;
+}
+
+/* Blends the visible surfels on the device, in the order of their cells. */
+static int blend_on_device(trip_surfels_cpu *s)
+{
+    size_t count = 0;
+    int status = s->device->read_depths(s->target, s->depths, s->fronts, s->numbers);
+    s->stats.visible = 0;
+    for (int row = 0; row < s->cell_rows && !status; row++)
+        for (int column = 0; column < s->pitch && !status; column++) {
+            if (!is_visible(s, row, column))
+                continue;
+            s->batch_cells[count++] = (uint32_t)cell_at(s, row, column);
+            s->stats.visible++;
+            if (count < s->batch_max)
+                continue;
+            status = s->device->blend(s->target, s->batch_cells, count);
+            count = 0;
+        }
+    if (!status && count)
+        status = s->device->blend(s->target, s->batch_cells, count);
+    return status ? status : s->device->read_sums(s->target, s->sums);
+}
+
+static void blend_on_cpu(trip_surfels_cpu *s)
+{
+    trip_run_tasks(&s->runner, bound_row, s, (unsigned)s->cell_rows);
+    if (!s->unselected)
+        trip_run_tasks(&s->runner, blend_strip, s, tasks_for((size_t)s->camera.height, STRIP));
+    s->stats.visible = 0;
+    for (int row = 0; row < s->cell_rows; row++)
+        s->stats.visible += s->reaches[row].visible;
 }
 
 static void divide_strip(void *context, unsigned strip)
@@ -479,7 +551,7 @@ void trip_surfels_cpu_each_visible(const trip_surfels_cpu *s,
     for (int row = 0; row < s->cell_rows; row++)
         for (int column = 0; column < s->pitch; column++)
             if (is_visible(s, row, column))
-                mark(context, (uint32_t)s->keys[(size_t)row * (size_t)s->pitch + (size_t)column]);
+                mark(context, (uint32_t)key_at(s, cell_at(s, row, column)));
 }
 
 /* ---- edges ---- */
@@ -586,18 +658,21 @@ static void write_row(void *context, unsigned row)
         write_pixel(p, x, (int)row);
 }
 
-void trip_surfels_cpu_picture(trip_surfels_cpu *s, float *rgba, float *depth)
+int trip_surfels_cpu_picture(trip_surfels_cpu *s, float *rgba, float *depth)
 {
     const uint64_t began = trip_now_ns();
     picture p = { s, rgba, s->settings.depth ? depth : NULL };
-    trip_run_tasks(&s->runner, bound_row, s, (unsigned)s->cell_rows);
-    trip_run_tasks(&s->runner, s->unselected ? divide_strip : blend_strip, s,
-                   tasks_for((size_t)s->camera.height, STRIP));
-    trip_run_tasks(&s->runner, write_row, &p, (unsigned)s->camera.height);
-    s->stats.visible = 0;
-    for (int row = 0; row < s->cell_rows; row++)
-        s->stats.visible += s->reaches[row].visible;
+    int status = 0;
+    if (s->device)
+        status = blend_on_device(s);
+    else
+        blend_on_cpu(s);
+    if (!status) {
+        trip_run_tasks(&s->runner, divide_strip, s, tasks_for((size_t)s->camera.height, STRIP));
+        trip_run_tasks(&s->runner, write_row, &p, (unsigned)s->camera.height);
+    }
     s->stats.blend_ns += trip_now_ns() - began;
+    return status;
 }
 
 trip_surfels_cpu_stats trip_surfels_cpu_get_stats(const trip_surfels_cpu *s)

@@ -15,6 +15,7 @@
 
 #include "budget.h"
 #include "gaussian_picture.h"
+#include "surfel_device.h"
 #include "task_runner.h"
 
 typedef struct trip_surfels_cpu trip_surfels_cpu;
@@ -24,8 +25,10 @@ typedef struct trip_surfels_cpu_params {
     const trip_gaussian_settings *settings; /* copied, but not the light */
     trip_budget *budget;
     const trip_task_runner *runner; /* NULL for no threads */
+    /* Draws the passes in place of the CPU; NULL for none. It must outlive the picture. */
+    const trip_surfel_device *device;
     /* Blends all surfels without selection, as in section 3 of the paper, to compare the times.
-     * The renderer then skips no surfel. The sums depend on the order. */
+     * The renderer then skips no surfel. The sums depend on the order. Not on a device. */
     bool unselected;
 } trip_surfels_cpu_params;
 
@@ -46,7 +49,7 @@ void trip_surfels_cpu_end(trip_surfels_cpu *s); /* NULL is allowed */
 typedef uint32_t trip_surfel_getter(const void *context, size_t i, trip_gaussian *out);
 
 /* Adds surfels, here with the numbers from `first` on. No number may be added twice. Fails if it is
- * interrupted. */
+ * interrupted, or if the device fails. */
 int trip_surfels_cpu_add(trip_surfels_cpu *s, const trip_gaussian *surfels, size_t count,
                          uint32_t first);
 int trip_surfels_cpu_add_from(trip_surfels_cpu *s, trip_surfel_getter *get, const void *context,
@@ -68,8 +71,8 @@ void trip_surfels_cpu_each_visible(const trip_surfels_cpu *s,
 
 /* Writes the picture of the surfels so far: width * height * 4 floats, premultiplied, row 0 at the
  * top, over the background. With settings.depth it also writes width * height distances; otherwise
- * `depth` is NULL. More surfels may be added afterwards. */
-void trip_surfels_cpu_picture(trip_surfels_cpu *s, float *rgba, float *depth);
+ * `depth` is NULL. More surfels may be added afterwards. Fails (reported) only on a device. */
+int trip_surfels_cpu_picture(trip_surfels_cpu *s, float *rgba, float *depth);
 
 trip_surfels_cpu_stats trip_surfels_cpu_get_stats(const trip_surfels_cpu *s);
 

@@ -72,7 +72,8 @@ static void draw(drawn *out, const trip_camera *c, const trip_gaussian_settings 
     add_all(s, surfels, count, w);
     if (w.unselected)
         assert_int_equal(trip_surfels_cpu_blend_from(s, get, surfels, count), 0);
-    trip_surfels_cpu_picture(s, out->rgba, settings->depth ? out->depth : NULL);
+    assert_int_equal(trip_surfels_cpu_picture(s, out->rgba, settings->depth ? out->depth : NULL),
+                     0);
     out->stats = trip_surfels_cpu_get_stats(s);
     trip_surfels_cpu_end(s);
     trip_cpu_pool_destroy(pool);
