@@ -1,5 +1,6 @@
 // A surfel in the picture, and the bounds of its ellipses.
-// Mirrors render/surfels/surfel_projected.h. No operations are fused, so that most bits are equal.
+// Mirrors render/surfels/surfel_projected.h. The results have the same bits on most drivers, since
+// no operations are fused.
 #include "shared.h"
 
 layout(location = TRIP_GL_SURFEL_PICTURE) uniform ivec2 picture; // width and height

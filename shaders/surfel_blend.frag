@@ -1,4 +1,4 @@
-// Adds a visible surfel to the sums of the pixels whose depths it is close to.
+// Adds a visible surfel to the sums of the pixels with a depth within its tolerance.
 // Mirrors blend() and blend_at() in render/surfels/surfels_cpu.c.
 #include "surfel.glsl"
 

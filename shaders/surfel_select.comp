@@ -1,5 +1,5 @@
-// Lets the surfels of a batch take their cells, in three stages: the least z' - t of each cell, the
-// least number of those that are equal, and the surfel itself.
+// Lets the surfels of a batch take their cells, in three stages. Each cell takes the least z' - t,
+// then the least number among equal ones, then the surfel with both.
 // In: the batch. In and out: the cells.
 // Mirrors lower_key() and write_some() in render/surfels/surfels_cpu.c.
 #include "surfel.glsl"

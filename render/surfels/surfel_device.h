@@ -1,6 +1,6 @@
-/* The passes of a deferred picture (surfel_picture.h) on a graphics device, which keeps the depths,
- * the cells and the sums. surfels_cpu.h projects surfels and chooses what is visible. All calls
- * come from one thread. Functions return 0 or a failure (reported), unless noted. */
+/* The passes of a deferred picture (surfel_picture.h) on a graphics device. The device keeps the
+ * depths, the cells and the sums. surfels_cpu.h projects the surfels and finds the visible ones.
+ * All calls come from one thread. Functions return 0 or a failure (reported), unless noted. */
 #ifndef TRIP_SURFEL_DEVICE_H
 #define TRIP_SURFEL_DEVICE_H
 

@@ -93,7 +93,7 @@ class Deferred(program.ProgramTest):
             self.assertLessEqual(fates["visible"], fates["read"] - fates["hidden"] - fates["outside"])
             self.assertLess(frame["bytes_read"], 24 * 60000)
 
-    def test_memory_threads_and_the_reference_agree(self):
+    def test_memory_threads_and_renderers_agree(self):
         at, normal = ball(60000)
         colours = ((at + 1) * 127).round()
         write_cloud("ball.ply", at, red=colours[:, 0], green=colours[:, 1], blue=colours[:, 2],
@@ -102,8 +102,11 @@ class Deferred(program.ProgramTest):
         one = self.picture("ball.ply", *view)
         for options in ("--memory", "32M"), ("--threads", "1"), ("--threads", "5"):
             numpy.testing.assert_array_equal(one, self.picture("ball.ply", *view, *options), str(options))
-        other = self.picture("ball.ply", *view, "--renderer", "reference")
-        self.assertLess(255 * abs(one - other).mean(), 0.05)
+        for renderer in ("reference", *program.GL):
+            other = self.picture("ball.ply", *view, "--renderer", renderer)
+            self.assertLess(255 * abs(one - other).mean(), 0.05)
+            stats = self.stats("ball.ply", *view, "--renderer", renderer)
+            self.assertEqual((stats["renderer"], stats["order"]), (renderer, "deferred"))
         self.fails(1, "render", "ball.ply", "-o", "x.png", "--size", "4000", "--memory", "24M",
                    says="raise --memory")
 
@@ -189,7 +192,6 @@ class Deferred(program.ProgramTest):
         for options, says in ((("--kernel", "exact"), "does not apply to --order deferred"),
                               (("--early-termination", "0.1"), "does not apply to --order deferred"),
                               (("--h", "0.5"), "nothing to merge"),
-                              (("--renderer", "gl"), "deferred requires"),
                               (("--renderer", "integral"), "has no order")):
             self.leaves_nothing(2, "render", "a.ply", "-o", "x.png", "--order", "deferred", *options,
                                 says=says)

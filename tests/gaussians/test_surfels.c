@@ -1,28 +1,10 @@
 /* The deferred picture of surfels: closed forms, the same bits in all circumstances, and the
  * reference renderer. */
-#include "gaussian_footprint.h"
 #include "pool_runner.h"
-#include "surfel_picture.h"
+#include "surfel_scenes.h"
 #include "surfels_cpu.h"
 #include "surfels_reference.h"
 #include "test.h"
-
-enum { WIDTH = 150, HEIGHT = 90, PIXELS = WIDTH * HEIGHT, SCENE = 6000, SIDE = 120 };
-
-/* Looks along z from the origin; x goes left. */
-static trip_camera camera_of(double ortho_height)
-{
-    const trip_camera_params params = { .look = trip_v3(0, 0, 1),
-                                        .up = trip_v3(0, 1, 0),
-                                        .fov_degrees = 60,
-                                        .ortho_height = ortho_height,
-                                        .width = WIDTH,
-                                        .height = HEIGHT };
-    const trip_affine identity = trip_affine_identity();
-    trip_camera c;
-    assert_int_equal(trip_camera_make(&c, &params, &identity), 0);
-    return c;
-}
 
 /* How a picture is drawn. 0 means one thread, one batch in order, and 64 MB. */
 typedef struct way {
@@ -34,7 +16,7 @@ typedef struct way {
 } way;
 
 typedef struct drawn {
-    float rgba[4 * PIXELS], depth[PIXELS];
+    float rgba[4 * SURFEL_PIXELS], depth[SURFEL_PIXELS];
     trip_surfels_cpu_stats stats;
 } drawn;
 
@@ -95,44 +77,13 @@ static void draw_reference(drawn *out, const trip_camera *c, const trip_gaussian
     trip_budget_destroy(budget);
 }
 
-static void colour(trip_gaussian *g, double red, double green, double blue)
-{
-    g->sh[0][0] = trip_sh_of_colour(red);
-    g->sh[0][1] = trip_sh_of_colour(green);
-    g->sh[0][2] = trip_sh_of_colour(blue);
-}
-
-/* A surfel with a radius. Its normal points along z, turned about x by an angle. */
-static trip_gaussian surfel_at(double x, double y, double z, double radius, double angle)
-{
-    const float d = (float)(0.85 * radius);
-    trip_gaussian g = { .centre = { x, y, z },
-                        .deviations = { d, d, 0 },
-                        .rotation = { (float)cos(angle / 2), (float)sin(angle / 2), 0, 0 },
-                        .opacity = 1 };
-    colour(&g, 1, 1, 1);
-    return g;
-}
-
-/* A plane through (0, 0, z), turned about x: SIDE * SIDE surfels of a square grid. Their radii are
- * the distance over the root of 2, as in clouds of points. */
-static trip_gaussian *plane_at(trip_gaussian *to, double z, double distance, double angle)
-{
-    for (int i = 0; i < SIDE * SIDE; i++) {
-        const double u = (i % SIDE - SIDE / 2 + 0.3) * distance;
-        const double v = (i / SIDE - SIDE / 2 + 0.4) * distance;
-        to[i] = surfel_at(u, v * cos(angle), z + v * sin(angle), distance / sqrt(2), angle);
-    }
-    return to;
-}
-
 static const float *pixel(const drawn *d, int x, int y)
 {
-    return d->rgba + 4 * (y * WIDTH + x);
+    return d->rgba + 4 * (y * SURFEL_WIDTH + x);
 }
 
 static drawn one, other;
-static trip_gaussian surfels[4 * SIDE * SIDE];
+static trip_gaussian surfels[4 * SURFEL_SIDE * SURFEL_SIDE];
 static const trip_gaussian_settings plain = { .depth = true };
 
 static void expect_pixel(const drawn *d, int x, int y, const double rgba[4], double tolerance)
@@ -147,10 +98,10 @@ static void a_disc_has_its_radius_and_an_edge_of_a_pixel(void **state)
 {
     (void)state;
     const trip_camera c =
-        camera_of(9); /* 10 px per unit; the centre of pixel (75, 45) is at 75.5 */
+        surfel_camera(9); /* 10 px per unit; the centre of pixel (75, 45) is at 75.5 */
     trip_gaussian g = surfel_at(-0.05, -0.05, 5, 2, 0);
     const double radius = sqrt(2 * log(2) * (1.5 * 1.5 * 17 * 17 + 0.4));
-    colour(&g, 0.25, 0.5, 1);
+    surfel_colour(&g, 0.25, 0.5, 1);
     draw(&one, &c, &plain, &g, 1, (way){ 0 });
     for (int d = 0; d < 40; d++) {
         const double a = fmax(0, fmin(1, radius - d));
@@ -159,9 +110,9 @@ static void a_disc_has_its_radius_and_an_edge_of_a_pixel(void **state)
         expect_pixel(&one, 75 - d, 45, rgba, 1e-4);
         expect_pixel(&one, 75, 45 + d, rgba, 1e-4);
         if (a > 0)
-            assert_close((double)one.depth[45 * WIDTH + 75 + d], 5, 1e-6);
+            assert_close((double)one.depth[45 * SURFEL_WIDTH + 75 + d], 5, 1e-6);
         else
-            assert_true(isinf(one.depth[45 * WIDTH + 75 + d]));
+            assert_true(isinf(one.depth[45 * SURFEL_WIDTH + 75 + d]));
     }
     assert_int_equal(one.stats.visible, 1);
 }
@@ -177,38 +128,40 @@ static void a_plane_is_closed_and_has_its_colour_and_depth(void **state)
     for (int ortho = 0; ortho < 2; ortho++)
         for (size_t i = 0; i < sizeof angles / sizeof *angles * 3; i++) {
             const double angle = angles[i / 3], distance = distances[i % 3];
-            const trip_camera c = camera_of(ortho ? 9 : 0);
-            plane_at(surfels, 5, distance, angle);
-            for (int k = 0; k < SIDE * SIDE; k++)
-                colour(&surfels[k], 0.25, 0.5, 0.75);
-            draw(&one, &c, &settings, surfels, SIDE * SIDE, (way){ 0 });
-            for (int at = 0; at < PIXELS; at++) {
-                const trip_vec3 ray = trip_camera_ray(&c, at % WIDTH + 0.5, at / WIDTH + 0.5);
-                const trip_vec3 across = trip_add(trip_scale(c.rx, at % WIDTH + 0.5),
-                                                  trip_scale(c.ry, at / WIDTH + 0.5));
+            const trip_camera c = surfel_camera(ortho ? 9 : 0);
+            surfel_plane(surfels, 5, distance, angle);
+            for (int k = 0; k < SURFEL_SIDE * SURFEL_SIDE; k++)
+                surfel_colour(&surfels[k], 0.25, 0.5, 0.75);
+            draw(&one, &c, &settings, surfels, SURFEL_SIDE * SURFEL_SIDE, (way){ 0 });
+            for (int at = 0; at < SURFEL_PIXELS; at++) {
+                const trip_vec3 ray =
+                    trip_camera_ray(&c, at % SURFEL_WIDTH + 0.5, at / SURFEL_WIDTH + 0.5);
+                const trip_vec3 across = trip_add(trip_scale(c.rx, at % SURFEL_WIDTH + 0.5),
+                                                  trip_scale(c.ry, at / SURFEL_WIDTH + 0.5));
                 const trip_vec3 from = ortho ? trip_add(c.eye, across) : c.eye;
                 const trip_vec3 normal = trip_v3(0, -sin(angle), cos(angle));
                 const double z =
                     trip_dot(normal, trip_sub(trip_v3(0, 0, 5), from)) / trip_dot(normal, ray);
                 const trip_vec3 p = trip_add(from, trip_scale(ray, z));
-                const double inside = (SIDE / 2 - 2) * distance;
+                const double inside = (SURFEL_SIDE / 2 - 2) * distance;
                 const double edge = 3 * trip_length(ortho ? c.rx : trip_scale(c.rx, z));
                 if (!(z > 2 * distance && fabs(p.x) < inside - edge &&
                       fabs(p.y) < inside * cos(angle) - edge))
                     continue;
                 seen++;
-                expect_pixel(&one, at % WIDTH, at / WIDTH, (double[]){ 0.25, 0.5, 0.75, 1 }, 1e-5);
+                expect_pixel(&one, at % SURFEL_WIDTH, at / SURFEL_WIDTH,
+                             (double[]){ 0.25, 0.5, 0.75, 1 }, 1e-5);
                 assert_close((double)one.depth[at], z * trip_length(ray),
                              0.1 * distance / cos(angle) + 0.4 * edge * tan(angle));
             }
         }
-    assert_true(seen > 10 * PIXELS);
+    assert_true(seen > 10 * SURFEL_PIXELS);
 }
 
 static void surfels_beyond_the_border_reach_the_picture(void **state)
 {
     (void)state;
-    const trip_camera c = camera_of(9);
+    const trip_camera c = surfel_camera(9);
     /* A disc of 100 px beside each corner and each side covers the whole picture. A small disc lies
      * between the left one and the picture, in front of it. */
     int count = 0;
@@ -218,26 +171,26 @@ static void surfels_beyond_the_border_reach_the_picture(void **state)
                 surfels[count++] = surfel_at(13.5 * x, 6 * y, 30, 10, 0);
     surfels[count++] = surfel_at(8.3, 0, 18, 0.5, 0);
     draw(&one, &c, &plain, surfels, (size_t)count, (way){ 0 });
-    for (int at = 0; at < PIXELS; at++)
-        expect_pixel(&one, at % WIDTH, at / WIDTH, (double[]){ 1, 1, 1, 1 }, 1e-6);
+    for (int at = 0; at < SURFEL_PIXELS; at++)
+        expect_pixel(&one, at % SURFEL_WIDTH, at / SURFEL_WIDTH, (double[]){ 1, 1, 1, 1 }, 1e-6);
     assert_int_equal(one.stats.visible, 9);
 }
 
 static void far_points_never_get_lost(void **state)
 {
     (void)state;
-    const trip_camera c = camera_of(9);
+    const trip_camera c = surfel_camera(9);
     for (int i = 0; i < 200; i++) {
         const double x = 12 * test_random() - 6, y = 8 * test_random() - 4;
         trip_gaussian g = surfel_at(x, y, 5, 1e-4, 0);
         draw(&one, &c, &plain, &g, 1, (way){ 0 });
         double sum = 0;
-        for (int at = 0; at < PIXELS; at++)
+        for (int at = 0; at < SURFEL_PIXELS; at++)
             sum += (double)one.rgba[4 * at + 3];
         assert_true(sum > 0.1 && sum < 1.2);
-        const int column = (int)floor(WIDTH / 2.0 - 10 * x),
-                  row = (int)floor(HEIGHT / 2.0 - 10 * y);
-        assert_true(isfinite(one.depth[row * WIDTH + column]));
+        const int column = (int)floor(SURFEL_WIDTH / 2.0 - 10 * x),
+                  row = (int)floor(SURFEL_HEIGHT / 2.0 - 10 * y);
+        assert_true(isfinite(one.depth[row * SURFEL_WIDTH + column]));
     }
 }
 
@@ -246,13 +199,13 @@ static void far_points_never_get_lost(void **state)
 static void only_the_front_plane_is_seen(void **state)
 {
     (void)state;
-    const trip_camera c = camera_of(0);
-    plane_at(surfels, 5, 0.1, 0.3);
-    plane_at(surfels + SIDE * SIDE, 5.3, 0.1, 0.3);
-    for (int k = 0; k < SIDE * SIDE; k++)
-        colour(&surfels[SIDE * SIDE + k], 1, 0, 0);
-    draw(&one, &c, &plain, surfels, SIDE * SIDE, (way){ 0 });
-    draw(&other, &c, &plain, surfels, 2 * SIDE * SIDE, (way){ 0 });
+    const trip_camera c = surfel_camera(0);
+    surfel_plane(surfels, 5, 0.1, 0.3);
+    surfel_plane(surfels + SURFEL_SIDE * SURFEL_SIDE, 5.3, 0.1, 0.3);
+    for (int k = 0; k < SURFEL_SIDE * SURFEL_SIDE; k++)
+        surfel_colour(&surfels[SURFEL_SIDE * SURFEL_SIDE + k], 1, 0, 0);
+    draw(&one, &c, &plain, surfels, SURFEL_SIDE * SURFEL_SIDE, (way){ 0 });
+    draw(&other, &c, &plain, surfels, 2 * SURFEL_SIDE * SURFEL_SIDE, (way){ 0 });
     assert_memory_equal(one.rgba, other.rgba, sizeof one.rgba);
     assert_memory_equal(one.depth, other.depth, sizeof one.depth);
 }
@@ -262,23 +215,23 @@ static void only_the_front_plane_is_seen(void **state)
 static void scans_of_one_surface_blend(void **state)
 {
     (void)state;
-    const trip_camera c = camera_of(9);
+    const trip_camera c = surfel_camera(9);
     double red = 0, green = 0;
-    plane_at(surfels, 5, 0.3, 0);
-    plane_at(surfels + SIDE * SIDE, 5, 0.3, 0);
-    for (int k = 0; k < 2 * SIDE * SIDE; k++) {
+    surfel_plane(surfels, 5, 0.3, 0);
+    surfel_plane(surfels + SURFEL_SIDE * SURFEL_SIDE, 5, 0.3, 0);
+    for (int k = 0; k < 2 * SURFEL_SIDE * SURFEL_SIDE; k++) {
         trip_gaussian *g = &surfels[k];
-        g->centre[0] += k < SIDE * SIDE ? 0 : 0.15;
+        g->centre[0] += k < SURFEL_SIDE * SURFEL_SIDE ? 0 : 0.15;
         g->centre[2] += 0.4 * g->deviations[0] * (test_random() - 0.5);
-        colour(g, k < SIDE * SIDE, k >= SIDE * SIDE, 0);
+        surfel_colour(g, k < SURFEL_SIDE * SURFEL_SIDE, k >= SURFEL_SIDE * SURFEL_SIDE, 0);
     }
-    draw(&one, &c, &plain, surfels, 2 * SIDE * SIDE, (way){ 0 });
-    for (int at = 0; at < PIXELS; at++) {
+    draw(&one, &c, &plain, surfels, 2 * SURFEL_SIDE * SURFEL_SIDE, (way){ 0 });
+    for (int at = 0; at < SURFEL_PIXELS; at++) {
         const float *p = one.rgba + 4 * at;
         assert_close((double)p[0] + (double)p[1], 1, 1e-5);
         assert_true((double)p[0] > 0.1 && (double)p[1] > 0.1);
-        red += (double)p[0] / PIXELS;
-        green += (double)p[1] / PIXELS;
+        red += (double)p[0] / SURFEL_PIXELS;
+        green += (double)p[1] / SURFEL_PIXELS;
     }
     assert_close(red, 0.5, 0.02);
     assert_close(green, 0.5, 0.02);
@@ -288,14 +241,15 @@ static void scans_of_one_surface_blend(void **state)
 static void an_edge_shows_the_surface_behind_it(void **state)
 {
     (void)state;
-    const trip_camera c = camera_of(9);
+    const trip_camera c = surfel_camera(9);
     const trip_gaussian_settings settings = { .background = { 0, 0, 1, 1 } };
-    plane_at(surfels, 9, 0.3, 0);
-    surfels[SIDE * SIDE] = surfel_at(-0.05, -0.05, 5, 2, 0);
-    for (int k = 0; k <= SIDE * SIDE; k++)
-        colour(&surfels[k], k == SIDE * SIDE, k < SIDE * SIDE, 0);
+    surfel_plane(surfels, 9, 0.3, 0);
+    surfels[SURFEL_SIDE * SURFEL_SIDE] = surfel_at(-0.05, -0.05, 5, 2, 0);
+    for (int k = 0; k <= SURFEL_SIDE * SURFEL_SIDE; k++)
+        surfel_colour(&surfels[k], k == SURFEL_SIDE * SURFEL_SIDE, k < SURFEL_SIDE * SURFEL_SIDE,
+                      0);
     const double radius = sqrt(2 * log(2) * (1.5 * 1.5 * 17 * 17 + 0.4));
-    draw(&one, &c, &settings, surfels, SIDE * SIDE + 1, (way){ 0 });
+    draw(&one, &c, &settings, surfels, SURFEL_SIDE * SURFEL_SIDE + 1, (way){ 0 });
     for (int d = 0; d < 40; d++) {
         const double a = fmax(0, fmin(1, radius - d));
         expect_pixel(&one, 75 + d, 45, (double[]){ a, 1 - a, 0, 1 }, 1e-4);
@@ -304,67 +258,30 @@ static void an_edge_shows_the_surface_behind_it(void **state)
 
 /* ---- the reference, and the same bits ---- */
 
-/* A repeatable scene: surfels of all directions and sizes, some merged, some near the eye, and two
- * planes. */
-static const trip_gaussian *random_scene(void)
-{
-    static trip_gaussian scene[SCENE];
-    if (scene[0].opacity > 0)
-        return scene;
-    for (int i = 0; i < SCENE; i++) {
-        trip_gaussian *g = &scene[i];
-        const double z = 0.1 + 20 * test_random(), size = i % 200 == 0 ? 1 : 0.1;
-        *g = surfel_at(z * (2 * test_random() - 1), z * (2 * test_random() - 1), z, 0, 0);
-        double length = 0;
-        for (int k = 0; k < 4; k++) {
-            g->rotation[k] = (float)(2 * test_random() - 1);
-            length += (double)(g->rotation[k] * g->rotation[k]);
-        }
-        for (int k = 0; k < 4; k++)
-            g->rotation[k] /= (float)sqrt(length);
-        for (int k = 0; k < 3; k++)
-            g->deviations[k] = (float)(size * exp(-3 * test_random()));
-        g->merged = i % 7 == 0;
-        if (!g->merged)
-            g->deviations[2] = 0;
-        g->opacity = i % 3 ? 0.99f : 0.5f;
-        colour(g, test_random(), test_random(), test_random());
-    }
-    for (int i = 0; i < SCENE / 2; i++) { /* equal depths in parallel views, and a noisy wall */
-        scene[i].centre[2] = i % 4 < 2 ? 12 + 2 * (i % 2) : 12 + 0.5 * test_random();
-        scene[i].rotation[0] = 1;
-        scene[i].rotation[1] = scene[i].rotation[2] = scene[i].rotation[3] = 0;
-        scene[i].deviations[0] = scene[i].deviations[1] = 0.12f;
-    }
-    return scene;
-}
-
-static const trip_gaussian_settings full = { .background = { 0.2, 0.4, 0.6, 0.9 }, .depth = true };
-
 static void cpu_draws_the_reference(void **state)
 {
     (void)state;
     for (int ortho = 0; ortho < 2; ortho++) {
-        const trip_camera c = camera_of(ortho ? 20 : 0);
+        const trip_camera c = surfel_camera(ortho ? 20 : 0);
         int apart = 0;
-        draw(&one, &c, &full, random_scene(), SCENE, (way){ 0 });
-        draw_reference(&other, &c, &full, random_scene(), SCENE);
-        for (int at = 0; at < PIXELS; at++) {
+        draw(&one, &c, &surfel_full, surfel_scene(), SURFEL_SCENE, (way){ 0 });
+        draw_reference(&other, &c, &surfel_full, surfel_scene(), SURFEL_SCENE);
+        for (int at = 0; at < SURFEL_PIXELS; at++) {
             const bool far = test_max_apart(one.rgba + 4 * at, other.rgba + 4 * at, 4) > 1e-3;
             const double a = (double)one.depth[at], b = (double)other.depth[at];
             apart += far || isinf(a) != isinf(b) || (isfinite(a) && fabs(a - b) > 1e-4 * b);
         }
         /* Rounding decides rarely whether a surfel covers a pixel, or lies within a tolerance. */
-        assert_in_range(apart, 0, PIXELS / 500);
+        assert_in_range(apart, 0, SURFEL_PIXELS / 500);
     }
 }
 
 static void expect_same(way w)
 {
     for (int ortho = 0; ortho < 2; ortho++) {
-        const trip_camera c = camera_of(ortho ? 20 : 0);
-        draw(&one, &c, &full, random_scene(), SCENE, (way){ 0 });
-        draw(&other, &c, &full, random_scene(), SCENE, w);
+        const trip_camera c = surfel_camera(ortho ? 20 : 0);
+        draw(&one, &c, &surfel_full, surfel_scene(), SURFEL_SCENE, (way){ 0 });
+        draw(&other, &c, &surfel_full, surfel_scene(), SURFEL_SCENE, w);
         assert_memory_equal(one.rgba, other.rgba, sizeof one.rgba);
         assert_memory_equal(one.depth, other.depth, sizeof one.depth);
         assert_int_equal(one.stats.visible, other.stats.visible);
@@ -392,15 +309,16 @@ static void order_and_batches_change_no_bit(void **state)
 static void selection_keeps_all_surfels_that_can_be_told_apart(void **state)
 {
     (void)state;
-    const trip_camera c = camera_of(0);
-    plane_at(surfels, 5, 0.3, 0.4);
-    for (int k = 0; k < SIDE * SIDE; k++)
-        colour(&surfels[k], test_random(), test_random(), test_random());
-    draw(&one, &c, &plain, surfels, SIDE * SIDE, (way){ .threads = 2 });
-    draw(&other, &c, &plain, surfels, SIDE * SIDE, (way){ .threads = 2, .unselected = true });
+    const trip_camera c = surfel_camera(0);
+    surfel_plane(surfels, 5, 0.3, 0.4);
+    for (int k = 0; k < SURFEL_SIDE * SURFEL_SIDE; k++)
+        surfel_colour(&surfels[k], test_random(), test_random(), test_random());
+    draw(&one, &c, &plain, surfels, SURFEL_SIDE * SURFEL_SIDE, (way){ .threads = 2 });
+    draw(&other, &c, &plain, surfels, SURFEL_SIDE * SURFEL_SIDE,
+         (way){ .threads = 2, .unselected = true });
     assert_true(one.stats.visible > 100);
     assert_true(other.stats.hidden == 0);
-    for (int i = 0; i < 4 * PIXELS; i++)
+    for (int i = 0; i < 4 * SURFEL_PIXELS; i++)
         assert_close((double)one.rgba[i], (double)other.rgba[i], 1e-4);
     assert_memory_equal(one.depth, other.depth, sizeof one.depth);
 }
@@ -409,15 +327,16 @@ static void selection_keeps_all_surfels_that_can_be_told_apart(void **state)
 static void hidden_surfels_of_noisy_scans_change_no_bit(void **state)
 {
     (void)state;
-    const trip_camera c = camera_of(0);
-    plane_at(surfels, 5, 0.05, 0.5);
-    plane_at(surfels + SIDE * SIDE, 5.02, 0.05, 0.5);
-    for (int k = 0; k < 2 * SIDE * SIDE; k++) {
+    const trip_camera c = surfel_camera(0);
+    surfel_plane(surfels, 5, 0.05, 0.5);
+    surfel_plane(surfels + SURFEL_SIDE * SURFEL_SIDE, 5.02, 0.05, 0.5);
+    for (int k = 0; k < 2 * SURFEL_SIDE * SURFEL_SIDE; k++) {
         surfels[k].centre[2] += 0.4 * (test_random() - 0.5);
-        colour(&surfels[k], test_random(), test_random(), test_random());
+        surfel_colour(&surfels[k], test_random(), test_random(), test_random());
     }
-    draw(&one, &c, &full, surfels, 2 * SIDE * SIDE, (way){ 0 });
-    draw(&other, &c, &full, surfels, 2 * SIDE * SIDE, (way){ .batch = 900, .backwards = true });
+    draw(&one, &c, &surfel_full, surfels, 2 * SURFEL_SIDE * SURFEL_SIDE, (way){ 0 });
+    draw(&other, &c, &surfel_full, surfels, 2 * SURFEL_SIDE * SURFEL_SIDE,
+         (way){ .batch = 900, .backwards = true });
     assert_memory_equal(one.rgba, other.rgba, sizeof one.rgba);
     assert_memory_equal(one.depth, other.depth, sizeof one.depth);
     assert_true(other.stats.hidden > 300);
@@ -432,7 +351,7 @@ static void memory_changes_no_bit(void **state)
 static void hidden_rectangles_are_told(void **state)
 {
     (void)state;
-    const trip_camera c = camera_of(9);
+    const trip_camera c = surfel_camera(9);
     trip_budget *budget;
     trip_surfels_cpu *s;
     assert_int_equal(trip_budget_create(&budget, 64u << 20), 0);
@@ -456,7 +375,7 @@ static void hidden_rectangles_are_told(void **state)
 static void too_little_memory_is_told(void **state)
 {
     (void)state;
-    const trip_camera c = camera_of(9);
+    const trip_camera c = surfel_camera(9);
     trip_budget *budget;
     trip_surfels_cpu *s;
     trip_surfels_reference *r;
