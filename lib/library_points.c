@@ -185,6 +185,14 @@ static void describe_surfels(const trip_point_info *info, triptych_gaussians *ou
     memcpy(out->hi, info->hi, sizeof out->hi);
 }
 
+static bool has_poses(const trip_point_info *info)
+{
+    bool all = info->scan_count > 0;
+    for (uint32_t i = 0; i < info->scan_count; i++)
+        all = all && info->scans[i].posed;
+    return all;
+}
+
 /* Bricks fused range images. */
 static int brick_hyperlines(const trip_brick_points_params *p, trip_budget *budget,
                             trip_brick_gaussians_result *made)
@@ -239,11 +247,15 @@ static int brick_file(triptych *t, trip_point_file *f, const char *path, const c
                                              &params.colouring);
     describe_surfels(info, out);
     out->flat = !o->point_uncertainty;
-    if (status == 0 && (o->point_uncertainty || o->point_hyperlines) &&
-        !(info->attributes & TRIP_POINT_UNCERTAINTY))
+    const bool ranges = info->attributes & TRIP_POINT_UNCERTAINTY;
+    if (status == 0 && o->point_hyperlines && !ranges)
         status = trip_fail(TRIP_USAGE, "brick", path,
-                           "is no sequence of range images with poses; --%s applies to these alone",
-                           o->point_uncertainty ? "uncertainty" : "hyperlines");
+                           "is no sequence of range images with poses; --hyperlines applies to "
+                           "these alone");
+    if (status == 0 && o->point_uncertainty && !ranges && !has_poses(info))
+        status = trip_fail(TRIP_USAGE, "brick", path,
+                           "does not tell where its scanner stood; --uncertainty applies to range "
+                           "images, and to scans with poses in E57, PCD or PTX");
     if (status == 0)
         status = find_up(info, path, o->axes, out->up);
     char *notes = status == 0 ? trip_context_scene_notes(path, out) : NULL;

@@ -155,8 +155,8 @@ typedef struct triptych_brick_options {
     /* Leaves out a point if the mean distance of its neighbours exceeds the mean over all points by
      * more than this many standard deviations, up to 1000. Default: keeps all points. */
     double point_outliers;
-    /* If not 0, samples of range images become ellipsoids with the uncertainty of their distance.
-     * Other clouds are refused. */
+    /* If not 0, samples of range images and of scans with poses become ellipsoids with the
+     * uncertainty of their distance. Clouds without the place of a scanner are refused. */
     int point_uncertainty;
     /* If not 0, range images are fused into points with the colours of several cameras. */
     int point_hyperlines;

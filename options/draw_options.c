@@ -360,8 +360,8 @@ static const trip_option point_rows[] = {
       "from the file, else from neighbours", .group = DRAW_GROUP_POINTS, AT(point_radius),
       CUSTOM(read_radius) },
     { "uncertainty", NULL,
-      "Draws each sample of a range image as an ellipsoid along its ray, as "
-      "long as its distance is uncertain",
+      "Draws each sample of range images, or of scans with poses, as an "
+      "ellipsoid along its ray, as long as its distance is uncertain",
       "surfels", .group = DRAW_GROUP_POINTS, .type = TRIP_OPTION_FLAG, AT(point_uncertainty) },
     { "hyperlines", NULL,
       "Fuses range images into points that look as the cameras nearest to the "

@@ -63,6 +63,9 @@ typedef struct bricker {
     uint64_t given;           /* rows of the spool, without tiles */
     /* Mean and sum of squares of the spreads, and the greatest spread that is kept. */
     double spread_mean, spread_squares, spread_max;
+    bool estimates;     /* uncertainties come from neighbours */
+    double certainty;   /* sum of 1 / uncertainty */
+    double uncertainty; /* the mean of point_ellipsoid.h */
     uint64_t outliers;
 } bricker;
 
@@ -93,7 +96,7 @@ static bool has_free_sides(const bricker *b)
 /* Whether all rows are completed before the first one is given out. */
 static bool completes_first(const bricker *b)
 {
-    return b->p->outliers > 0 || has_late_values(b) || has_free_sides(b);
+    return b->p->outliers > 0 || b->estimates || has_late_values(b) || has_free_sides(b);
 }
 
 static void tell(void *user, uint64_t more)
@@ -143,8 +146,11 @@ static int spool_point(bricker *b, const trip_point *p)
         return 0;
     }
     memcpy(row.position, p->position, sizeof row.position);
-    memcpy(row.normal, p->normal, sizeof row.normal);
-    if (b->p->uncertain)
+    if (b->estimates)
+        row.radius = 0;
+    else
+        memcpy(row.normal, p->normal, sizeof row.normal);
+    if (b->p->uncertain && !b->estimates)
         trip_point_aim(&row, p, b->info->scans[p->scan].scanner);
     if (b->p->colouring == TRIP_POINT_BY_RGB)
         memcpy(row.colour, p->colour, sizeof row.colour);
@@ -304,6 +310,11 @@ static void complete_row(const bricker *b, const trip_neighbours *n, trip_point_
         return;
     find_towards(b, row, towards);
     const trip_surfel_shape shape = trip_surfel_shape_of(n, towards);
+    if (b->estimates) {
+        trip_point_estimate(row, &shape, b->info->scans[(uint32_t)row->scan].scanner,
+                            b->radius_max);
+        return;
+    }
     for (int a = 0; a < 3 && !has_normal(row); a++) {
         row->normal[0] = (float)shape.normal[0];
         row->normal[1] = (float)shape.normal[1];
@@ -433,6 +444,7 @@ static void note_row(bricker *b, const trip_point_row *row, uint64_t number)
     const double spread = (double)row->spread, apart = spread - b->spread_mean;
     b->spread_mean += apart / (double)number;
     b->spread_squares += apart * (spread - b->spread_mean);
+    b->certainty += b->estimates && row->uncertainty > 0 ? 1 / (double)row->uncertainty : 0;
     if (has_late_values(b) && trip_gaussian_is_sampled(row->head.number, b->info->points))
         b->values[b->sample.count++] = value_of(row);
 }
@@ -510,6 +522,8 @@ static int complete_first(bricker *b)
     release_tiles(b);
     b->spool = rows;
     b->lacking = false; /* the rows are complete */
+    if (b->estimates)
+        b->uncertainty = b->certainty > 0 ? (double)b->records / b->certainty : 0;
     if (b->p->outliers > 0 && b->records > 1)
         b->spread_max =
             b->spread_mean + b->p->outliers * sqrt(b->spread_squares / (double)(b->records - 1));
@@ -547,7 +561,7 @@ static void make_surfel(const bricker *b, const trip_point_row *row, trip_gaussi
     trip_point_turn_to(row->normal, g->rotation);
     g->opacity = 1;
     if (b->p->uncertain)
-        trip_point_stretch(g, row, factor, b->info->uncertainty);
+        trip_point_stretch(g, row, factor, b->uncertainty);
     if (b->p->colouring == TRIP_POINT_BY_RGB)
         memcpy(rgb, row->colour, sizeof rgb);
     else
@@ -682,10 +696,13 @@ static int run(bricker *b, trip_brick_gaussians_result *result)
 int trip_brick_points(const trip_brick_points_params *params, trip_budget *budget,
                       trip_brick_gaussians_result *result)
 {
+    const trip_point_info *info = trip_point_file_info(params->file);
     bricker b = {
         .p = params,
-        .info = trip_point_file_info(params->file),
+        .info = info,
         .budget = budget,
+        .estimates = params->uncertain && !(info->attributes & TRIP_POINT_UNCERTAINTY),
+        .uncertainty = info->uncertainty,
         .spool.fd = -1,
         .all_lo = { INFINITY, INFINITY, INFINITY },
         .all_hi = { -INFINITY, -INFINITY, -INFINITY },

@@ -30,7 +30,9 @@ typedef struct trip_brick_points_params {
      * this many standard deviations (Rusu et al. 2008). 0 keeps all points. */
     double outliers;
     uint64_t *outliers_out; /* their number; or NULL */
-    bool uncertain;         /* ellipsoids along the rays of the scanner (point_ellipsoid.h) */
+    /* Ellipsoids along the rays of the scanner (point_ellipsoid.h): of range images, or of scans
+     * that all have poses. */
+    bool uncertain;
     unsigned threads;
     /* Called by the bricking thread with the number of rows that have passed, and of all. */
     void (*progress)(void *user, uint64_t passed, uint64_t all);

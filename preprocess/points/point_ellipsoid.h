@@ -1,5 +1,5 @@
-/* Samples of range images as ellipsoids (Hofsetz and Max 2005, section 6). Pure functions. The
- * paper leaves the weight to a dissertation; this one is ours.
+/* Samples of range images, and points of scans, as ellipsoids (Hofsetz and Max 2005, section 6).
+ * Pure functions. The paper leaves the weight to a dissertation; this one is ours.
  *
  * The third axis points to the camera. Its deviation is the uncertainty sigma of the distance
  * (range_shape.h). The other two deviations are half the width of a pixel at the distance. The
@@ -8,15 +8,28 @@
  *     o = 1 / (1 + (sigma / (2 s))^2)
  *
  * s is the harmonic mean of sigma over all samples. So o does not depend on the unit of length, and
- * a few samples of large uncertainty do not change it. */
+ * a few samples of large uncertainty do not change it.
+ *
+ * A point of a scan has neighbours in space (surfel_shape.h) in place of a depth image. Let theta
+ * be the angle between its normal and the ray to the scanner, at most TRIP_RANGE_GRAZING. Let s be
+ * the distance of points on the surface, and r the roughness. The scanner has samples at the
+ * distance 2 h across the ray. Within a sample of a tilted surface, the distance varies by
+ * h tan(theta):
+ *
+ *     h = sqrt(cos theta) s / 2,    sigma^2 = h^2 (1/16 + tan^2 theta) + (r / cos theta)^2
+ *
+ * 1/16 keeps points of a smooth surface from being certain. These formulas are ours, too. */
 #ifndef TRIP_POINT_ELLIPSOID_H
 #define TRIP_POINT_ELLIPSOID_H
 
 #include <math.h>
+#include <string.h>
 
 #include "gaussian.h"
 #include "point.h"
 #include "point_tiles.h"
+#include "range_shape.h"
+#include "surfel_shape.h"
 
 /* Sets direction, width and uncertainty of a row. */
 static inline void trip_point_aim(trip_point_row *row, const trip_point *p, const double camera[3])
@@ -31,6 +44,25 @@ static inline void trip_point_aim(trip_point_row *row, const trip_point *p, cons
         row->normal[a] = length > 0 ? (float)(to[a] / length) : (float)(a == 2);
     row->radius = p->footprint;
     row->uncertainty = p->uncertainty;
+}
+
+/* Sets direction, width and uncertainty of a row from its neighbours. The radius is at most
+ * `radius_max`. */
+static inline void trip_point_estimate(trip_point_row *row, const trip_surfel_shape *shape,
+                                       const double camera[3], double radius_max)
+{
+    trip_point p = { .footprint = 0 };
+    memcpy(p.position, row->position, sizeof p.position);
+    trip_point_aim(row, &p, camera);
+    double cosine = 0;
+    for (int a = 0; a < 3; a++)
+        cosine += (double)row->normal[a] * shape->normal[a];
+    cosine = fmin(1, fmax(cosine, cos(TRIP_RANGE_GRAZING)));
+    const double distance = sqrt(2) * fmin(shape->radius, radius_max);
+    const double half = sqrt(cosine) * distance / 2, slope2 = 1 / (cosine * cosine) - 1;
+    const double rough = shape->roughness / cosine;
+    row->radius = (float)half;
+    row->uncertainty = (float)sqrt(half * half * (1.0 / 16 + slope2) + rough * rough);
 }
 
 /* Sets deviations and opacity of a Gaussian that is turned to the camera. `factor` multiplies the

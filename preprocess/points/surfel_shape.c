@@ -175,6 +175,15 @@ static void set_variance(const sums *s, double count, double variance[3][3])
             variance[a][b] = squares[a][b] / count - s->offset[a] * s->offset[b] / count / count;
 }
 
+static double variance_along(const double variance[3][3], trip_vec3 axis)
+{
+    double sum = 0;
+    for (int a = 0; a < 3; a++)
+        for (int b = 0; b < 3; b++)
+            sum += variance[a][b] * trip_component(axis, a) * trip_component(axis, b);
+    return fmax(0, sum);
+}
+
 trip_surfel_shape trip_surfel_shape_of(const trip_neighbours *n, const double towards[3])
 {
     trip_vec3 to = trip_v3(towards[0], towards[1], towards[2]);
@@ -184,13 +193,16 @@ trip_surfel_shape trip_surfel_shape_of(const trip_neighbours *n, const double to
     trip_surfel_shape s = { .radius = INFINITY, .normal = { to.x, to.y, to.z } };
     if (n->count == 0)
         return s;
-    double variance[3][3], reach = sqrt(n->nearest[n->count - 1].distance2);
+    double variance[3][3], turned[3][3], reach = sqrt(n->nearest[n->count - 1].distance2);
+    const double unit = reach;
     const sums all = sum_offsets(n, reach);
     set_variance(&all, n->count + 1, variance);
+    memcpy(turned, variance, sizeof turned);
     if (n->count >= TRIP_NEIGHBOURS_MIN)
         reach *= fmin(1, TRIP_SURFEL_SPREAD * sqrt(spread2(&all, n->count)));
     s.radius = reach * sqrt(M_PI / 2 / n->count);
-    const trip_vec3 normal = normal_of(variance, to);
+    const trip_vec3 normal = normal_of(turned, to);
+    s.roughness = unit * sqrt(variance_along(variance, normal));
     s.normal[0] = normal.x;
     s.normal[1] = normal.y;
     s.normal[2] = normal.z;

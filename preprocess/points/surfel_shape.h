@@ -10,6 +10,9 @@
  * line, the direction across it that is nearest to `towards`. A normal points to the side of
  * `towards`.
  *
+ * Roughness: the root mean square distance of the neighbours and the point from the plane through
+ * their mean with this normal.
+ *
  * Density: k / (pi R^2) points per unit of area. */
 #ifndef TRIP_SURFEL_SHAPE_H
 #define TRIP_SURFEL_SHAPE_H
@@ -21,6 +24,7 @@
 typedef struct trip_surfel_shape {
     double radius; /* infinite without neighbours */
     double normal[3];
+    double roughness; /* 0 without neighbours */
 } trip_surfel_shape;
 
 /* `towards` need not have unit length. Without neighbours, it is the normal's direction. */

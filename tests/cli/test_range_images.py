@@ -228,11 +228,60 @@ class RangeImages(program.ProgramTest):
         self.leaves_nothing(1, "brick", CORNER, "-o", "no.trip", "--hyperlines", "--memory", "1M",
                             says="raise --memory")
 
+    def test_points_of_a_scan_are_ellipsoids_along_their_rays(self):
+        """A bumpy surface with a scanner far above, seen at 30 degrees from the scanner. Expected
+        values come from the formulas of point_ellipsoid.h, with all neighbours by brute force."""
+        r = numpy.random.default_rng(11)
+        count, k, scanner = 300, 12, numpy.array([0.4, -0.3, 40])
+        points = r.uniform(-1, 1, (count, 3))
+        points[:, 2] = 0.5 * points[:, 0] + 0.2 * numpy.sin(3 * points[:, 1]) + r.normal(0, 0.02, count)
+        lines = [str(count), "1", " ".join(map(repr, scanner.tolist())),
+                 "1 0 0", "0 1 0", "0 0 1", "1 0 0 0", "0 1 0 0", "0 0 1 0",
+                 " ".join(map(repr, [*scanner.tolist(), 1])),
+                 *[" ".join(map(repr, [*(p - scanner).tolist(), 1.0])) for p in points]]
+        program.write("scan.ptx", ("\n".join(lines) + "\n").encode())
+        away = numpy.linalg.norm(points[:, None] - points, axis=2)
+        rays, half, sigma = scanner - points, numpy.empty(count), numpy.empty(count)
+        rays /= numpy.linalg.norm(rays, axis=1)[:, None]
+        for i in range(count):
+            near = numpy.argsort(away[i])[:k + 1]  # the point itself is the first one
+            variances, axes = numpy.linalg.eigh(numpy.cov(points[near].T, bias=True))
+            cosine = max(abs(axes[:, 0] @ rays[i]), math.cos(1.5))
+            spread = math.sqrt((numpy.linalg.norm(points[near[1:]] - points[near[1:]].mean(0), axis=1) ** 2).mean())
+            apart = min(away[i, near[-1]], 1.7 * spread) * math.sqrt(math.pi / k)
+            half[i] = math.sqrt(cosine) * apart / 2
+            sigma[i] = math.sqrt(half[i] ** 2 * (1 / 16 + 1 / cosine ** 2 - 1) + variances[0] / cosine ** 2)
+        opacity = 1 / (1 + (sigma / (2 * count / (1 / sigma).sum())) ** 2)
+        turn = math.radians(30)
+        toward = numpy.array([math.sin(turn), 0, math.cos(turn)])
+        right, up = numpy.array([math.cos(turn), 0, -math.sin(turn)]), numpy.array([0, 1, 0])
+        size, height = 90, 2.5
+        scale = size / height
+        at = numpy.arange(size) + 0.5 - size / 2
+        passes = numpy.ones((size, size))
+        for i in range(count):
+            inside = numpy.eye(3) * half[i] ** 2 + numpy.outer(rays[i], rays[i]) * (sigma[i] ** 2 - half[i] ** 2)
+            plane = numpy.stack([right, up])
+            form = numpy.linalg.inv(plane @ inside @ plane.T * scale ** 2 + 0.3 * numpy.eye(2))
+            dx, dy = numpy.meshgrid(at - scale * points[i] @ right, -at - scale * points[i] @ up)
+            q = form[0, 0] * dx * dx + 2 * form[0, 1] * dx * dy + form[1, 1] * dy * dy
+            alpha = opacity[i] * max(0, rays[i] @ toward) ** 4 * numpy.exp(-q / 2)
+            passes *= 1 - numpy.where(alpha < 1 / 255, 0, numpy.minimum(alpha, 0.99))
+        eye = 9 * toward
+        for options in (), ("--threads", 1, "--memory", "32M"):
+            picture = self.picture("scan.ptx", "--uncertainty", "--size", f"{size}x{size}", "--ortho", height,
+                                   "--eye", ",".join(map(repr, eye.tolist())), "--look", "0,0,0", "--up", "0,1,0",
+                                   *options)
+            far = numpy.abs(picture[:, :, 3] - (1 - passes))
+            self.assertGreater((1 - passes).mean(), 0.3)
+            self.assertLess(far.mean(), 0.002)
+            self.assertLess(far.max(), 0.02)
+
     def test_uncertainty_is_refused_for_what_has_none(self):
         write_cloud("a.ply", grid(4))
         write_las("a.las", grid(4), [2] * 16)
         program.write_nrrd("v.nrrd", numpy.zeros((4, 4, 4), "u1"))
-        for name, says in (("a.ply", "is no sequence of range images"), ("a.las", "is no sequence"),
+        for name, says in (("a.ply", "does not tell where its scanner stood"), ("a.las", "does not tell"),
                            ("v.nrrd", "is no cloud"), (os.path.join(program.DATASETS, "train-1000.ply"),
                                                        "is no cloud")):
             self.leaves_nothing(2, "brick", name, "-o", "no.trip", "--uncertainty", says=says)
