@@ -237,10 +237,11 @@ static void add_scenes(const triptych *t, bool reach, trip_view_object *o)
         o->hi[a] = -INFINITY;
     }
     for (unsigned i = 0; i < t->placed_count; i++) {
-        const trip_file_gaussian_header *of = &t->placed[i].set->header;
+        const trip_gaussian_set *set = t->placed[i].set;
+        const trip_file_gaussian_header *of = &set->header;
         const bool whole = reach || is_without_strays(of);
-        add_box(&t->placed[i].placement, whole ? of->reach_lo : of->typical_lo,
-                whole ? of->reach_hi : of->typical_hi, o->lo, o->hi);
+        add_box(&t->placed[i].placement, whole ? set->finest_lo : of->typical_lo,
+                whole ? set->finest_hi : of->typical_hi, o->lo, o->hi);
     }
 }
 

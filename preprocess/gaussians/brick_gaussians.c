@@ -574,12 +574,18 @@ static int begin_levels(bricker *b)
                : fail_memory(b);
 }
 
+static uint64_t leaf_aim(const bricker *b)
+{
+    return b->p->flags & TRIP_GAUSSIAN_CLOUD ? trip_octree_cloud_aim(b->records)
+                                             : TRIP_OCTREE_LEAF_AIM;
+}
+
 /* Builds the octree from the spool. */
 static int order(bricker *b)
 {
     int status = take_sample(b);
-    if (status == TRIP_OK &&
-        !trip_octree_build(&b->octree, &b->sample, b->records, b->lo, b->hi, b->budget))
+    if (status == TRIP_OK && !trip_octree_build(&b->octree, &b->sample, b->records, leaf_aim(b),
+                                                b->lo, b->hi, b->budget))
         status = fail_memory(b);
     if (status == TRIP_OK)
         status = begin_levels(b);

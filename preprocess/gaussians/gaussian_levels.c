@@ -7,7 +7,7 @@
 
 enum {
     FEWER = 2,
-    FEW = 4096,
+    FEW_PART = 8,
     VOXELS = TRIP_OCTREE_DEPTH_MAX + TRIP_LEVEL_HALVINGS,
     CHUNK = 32, /* Gaussians of an item of work */
     BATCH_MIN = 32,
@@ -313,12 +313,13 @@ static uint64_t select_node(trip_gaussian_levels *l, uint64_t node)
 {
     const trip_octree_node *n = &l->p.octree->nodes[node];
     part *p = &l->parts[node];
+    const uint64_t few = l->p.octree->leaf_aim / FEW_PART;
     uint64_t inside = 0;
     if (!n->children[0])
         return p->records;
     for (int i = 0; i < 8; i++)
         inside += select_node(l, (uint64_t)n->children[i]);
-    for (unsigned k = 2; k <= TRIP_LEVEL_HALVINGS && inside > FEW; k++)
+    for (unsigned k = 2; k <= TRIP_LEVEL_HALVINGS && inside > few; k++)
         if (p->counts[k] > 0 && p->counts[k] <= inside / FEWER &&
             p->counts[k] <= TRIP_LEVEL_RECORDS_MAX) {
             p->records = p->counts[k];

@@ -127,15 +127,15 @@ static void set_cube(trip_octree *o, const double lo[3], const double hi[3])
 }
 
 bool trip_octree_build(trip_octree *o, const trip_gaussian_sample *sample, uint64_t records,
-                       const double lo[3], const double hi[3], trip_budget *budget)
+                       uint64_t leaf_aim, const double lo[3], const double hi[3],
+                       trip_budget *budget)
 {
     const size_t bytes = 2 * (sample->count + 1) * sizeof(trip_key);
     const double share = (double)sample->count / (double)records;
-    *o = (trip_octree){ .budget = budget };
+    *o = (trip_octree){ .leaf_aim = leaf_aim, .budget = budget };
     set_cube(o, lo, hi);
     trip_key *keys = trip_budget_take(budget, bytes);
-    build b = { o, sample, keys, keys + sample->count + 1,
-                (uint64_t)(TRIP_OCTREE_LEAF_AIM * share) };
+    build b = { o, sample, keys, keys + sample->count + 1, (uint64_t)((double)leaf_aim * share) };
     for (uint64_t i = 0; keys && i < sample->count; i++)
         keys[i].number = i;
     o->room = keys ? count_nodes(&b, 0, sample->count, 0) : 0;

@@ -9,7 +9,8 @@
 #include "gaussian_tree.h"
 
 enum {
-    TRIP_OCTREE_LEAF_AIM = 1 << 15, /* the most records of a leaf, about */
+    TRIP_OCTREE_LEAF_AIM = 1 << 15, /* of a scene */
+    TRIP_OCTREE_LEAF_MIN = 64,      /* of a cloud */
     TRIP_OCTREE_DEPTH_MAX = 40,     /* of a leaf */
     TRIP_OCTREE_BITS = 52,          /* of a place along an axis */
 };
@@ -26,14 +27,24 @@ typedef struct trip_octree_place {
 
 typedef struct trip_octree {
     double lo[3], side; /* of the whole cube */
+    uint64_t leaf_aim;  /* the most records of a leaf, about */
     trip_octree_node *nodes;
     uint64_t node_count, room;
     trip_budget *budget;
 } trip_octree;
 
+/* Returns the leaf_aim of a cloud of points. Small clouds have several leaves too, and so coarse
+ * levels. A scene file may place them thousands of times. */
+static inline uint64_t trip_octree_cloud_aim(uint64_t records)
+{
+    const uint64_t aim = records > TRIP_OCTREE_LEAF_AIM ? TRIP_OCTREE_LEAF_AIM : records / 8;
+    return aim > TRIP_OCTREE_LEAF_MIN ? aim : TRIP_OCTREE_LEAF_MIN;
+}
+
 /* Builds the octree for centres from `lo` to `hi`. Returns false if the budget is too small. */
 bool trip_octree_build(trip_octree *o, const trip_gaussian_sample *sample, uint64_t records,
-                       const double lo[3], const double hi[3], trip_budget *budget);
+                       uint64_t leaf_aim, const double lo[3], const double hi[3],
+                       trip_budget *budget);
 void trip_octree_free(trip_octree *o);
 
 trip_octree_place trip_octree_place_of(const trip_octree *o, const double centre[3]);

@@ -368,8 +368,8 @@ static size_t rows_bytes(const bricker *b)
 static int prepare_tiles(bricker *b)
 {
     int status = trip_workers_create(&b->workers, b->p->threads);
-    if (status == 0 &&
-        !trip_octree_build(&b->octree, &b->sample, b->records, b->all_lo, b->all_hi, b->budget))
+    if (status == 0 && !trip_octree_build(&b->octree, &b->sample, b->records, TRIP_OCTREE_LEAF_AIM,
+                                          b->all_lo, b->all_hi, b->budget))
         status = fail_memory(b);
     const trip_point_tiles_params params = { .spool = &b->spool,
                                              .workers = b->workers,
@@ -639,7 +639,8 @@ static int brick_surfels(bricker *b, trip_brick_gaussians_result *result)
     const trip_brick_points_params *p = b->p;
     const uint32_t surfels = TRIP_GAUSSIAN_FLAT | TRIP_GAUSSIAN_CLOUD |
                              (p->colouring == TRIP_POINT_BY_RGB ? 0 : TRIP_GAUSSIAN_SHADED);
-    const bool keeps_order = b->ordered && !(p->outliers > 0);
+    /* A small cloud gets a finer octree. */
+    const bool keeps_order = b->ordered && !(p->outliers > 0) && b->records > TRIP_OCTREE_LEAF_AIM;
     release_sample(b);
     b->passed += b->records;
     return trip_brick_gaussians(

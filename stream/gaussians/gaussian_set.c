@@ -141,6 +141,23 @@ static int open_files(trip_gaussian_set *s, int folder)
     return status;
 }
 
+static void find_finest(trip_gaussian_set *s)
+{
+    for (int a = 0; a < 3; a++) {
+        s->finest_lo[a] = INFINITY;
+        s->finest_hi[a] = -INFINITY;
+    }
+    for (uint64_t n = 0; n < s->header.node_count; n++) {
+        const trip_file_gaussian_node *node = &s->nodes[n];
+        const trip_file_gaussian_brick *b = s->lists[0].bricks + node->first_brick[0];
+        for (uint64_t i = 0; i < node->brick_count[0] && node->nodes == 1; i++)
+            for (int a = 0; a < 3; a++) {
+                s->finest_lo[a] = fmin(s->finest_lo[a], b[i].reach_lo[a]);
+                s->finest_hi[a] = fmax(s->finest_hi[a], b[i].reach_hi[a]);
+            }
+    }
+}
+
 int trip_gaussian_set_open(trip_gaussian_set **out, const char *path, trip_budget *budget)
 {
     trip_gaussian_set *s = calloc(1, sizeof *s);
@@ -158,10 +175,12 @@ int trip_gaussian_set_open(trip_gaussian_set **out, const char *path, trip_budge
                                   : open_files(s, folder);
     if (folder >= 0)
         close(folder);
-    if (status < 0)
+    if (status < 0) {
         trip_gaussian_set_close(s);
-    else
-        *out = s;
+        return status;
+    }
+    find_finest(s);
+    *out = s;
     return status;
 }
 

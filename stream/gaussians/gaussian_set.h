@@ -21,6 +21,7 @@ typedef struct trip_gaussian_set {
     char *path;
     trip_file_gaussian_header header;
     const trip_file_gaussian_node *nodes;
+    double finest_lo[3], finest_hi[3]; /* bounds of the ellipsoids of the finest level */
     const unsigned char *palette; /* entries; NULL without a palette */
     trip_gaussian_list lists[3];  /* along X, Y, Z */
     char *text;                   /* JSON, null-terminated */

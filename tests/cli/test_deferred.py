@@ -110,6 +110,21 @@ class Deferred(program.ProgramTest):
         self.fails(1, "render", "ball.ply", "-o", "x.png", "--size", "4000", "--memory", "24M",
                    says="raise --memory")
 
+    def test_small_clouds_have_coarse_levels(self):
+        """A ball of 8000 points, 12 pixels wide, is drawn from a fifth of them at most. Its distance from the
+        mean of 8 x 8 rays per pixel is at most twice that of the picture of all points."""
+        at, normal = ball(8000)
+        colours = ((at + 1) * 127).round()
+        write_cloud("small.ply", at, red=colours[:, 0], green=colours[:, 1], blue=colours[:, 2],
+                    nx=normal[:, 0], ny=normal[:, 1], nz=normal[:, 2])
+        view = ("--size", "32x32", "--eye", "1,2,30", "--look", "0,0,0", "--fov", "10.2")
+        truth = self.picture("small.ply", *view, "--lod", "0", "--samples", "8")
+        self.assertTrue(90 < (truth[:, :, 3] > 0.5).sum() < 140)
+        apart = [255 * abs(self.picture("small.ply", *view, *options) - truth).mean()
+                 for options in ((), ("--lod", "0"))]
+        self.assertLess(apart[0], 2 * apart[1])
+        self.assertLess(self.stats("small.ply", *view)["frames"][0]["surfels"]["planned"], 1600)
+
     def test_a_large_turn_between_two_pictures_leaves_no_holes(self):
         """Figure 3 of Guennebaud et al. 2004. Each picture of a path has the bits of a picture alone,
         whatever was visible before."""

@@ -60,7 +60,8 @@ static void make_tiles(cloud *c, uint64_t memory)
             hi[a] = fmax(hi[a], c->points[i][a]);
         }
     }
-    assert_true(trip_octree_build(&c->octree, &sample, c->count, lo, hi, c->budget));
+    assert_true(
+        trip_octree_build(&c->octree, &sample, c->count, TRIP_OCTREE_LEAF_AIM, lo, hi, c->budget));
     assert_int_equal(trip_output_flush(&c->spool), 0);
     trip_workers *workers;
     assert_int_equal(trip_workers_create(&workers, 2), 0);
