@@ -108,6 +108,7 @@ template <typename TreeT> class trip_vdb_tree_check
     static void skip_values(trip_vdb_stream &is, openvdb::Index count, const MaskT &mask,
                             bool as_half)
     {
+        check_masking(is);
         openvdb::io::readCompressedValues<ValueT>(is, nullptr, count, mask, as_half);
         check_chunk(is, count * sizeof(ValueT));
     }
@@ -130,6 +131,19 @@ template <typename TreeT> class trip_vdb_tree_check
     }
 
   private:
+    /* Refuses masked values in a grid without masked values. The library reads such values from
+     * another byte than it skips to. */
+    static void check_masking(trip_vdb_stream &is)
+    {
+        namespace io = openvdb::io;
+        if (io::getFormatVersion(is) < openvdb::OPENVDB_FILE_VERSION_NODE_MASK_COMPRESSION ||
+            io::getDataCompression(is) & io::COMPRESS_ACTIVE_MASK)
+            return;
+        if (is.peek() != io::NO_MASK_AND_ALL_VALS)
+            throw trip_vdb_error("is corrupt: masked values at byte " +
+                                 std::to_string((int64_t)is.tellg()) + " of an unmasked grid");
+    }
+
     /* Returns whether the size in the Blosc header matches the chunk. The library does not check
      * it. */
     static bool is_blosc_chunk(trip_vdb_stream &is, int64_t start, int64_t stored)

@@ -638,16 +638,16 @@ void many_threads_decode_at_once(void **)
     assert_true(serial == parallel);
 }
 
-/* Opens the file and decodes up to 100 portions. Expects one line for each failure and no other
+/* Opens the file and decodes up to `most` portions. Expects one line for each failure and no other
  * line. */
-void read_whatever_it_is(const File &file)
+void read_whatever_it_is(const File &file, size_t most)
 {
     expect_line();
     Volume v(file);
     int failures = v.status < 0;
     if (v.status == 0) {
         std::vector<trip_volume_portion> portions = v.portions();
-        for (size_t n = 0; n < portions.size() && n < 100; n++)
+        for (size_t n = 0; n < portions.size() && n < most; n++)
             failures += Decoded(v, portions[n]).status < 0;
     }
     trip_report_redirect(nullptr, nullptr);
@@ -723,9 +723,80 @@ void a_corrupted_file_does_no_harm(void **)
             int64_t value = bytes == 1 ? (int64_t)random() : sizes[random() % 6];
             std::memcpy(&bad[random() % (bad.size() - 8)], &value, bytes);
             file.put(bad);
-            read_whatever_it_is(file);
+            read_whatever_it_is(file, 100);
         }
     }
+}
+
+/* Returns a file with nodes of every level and a background other than 0. Values of tiles fill
+ * compressed chunks. */
+std::string tiled_file(uint32_t compression)
+{
+    openvdb::initialize();
+    openvdb::FloatGrid::Ptr grid = openvdb::FloatGrid::create(3);
+    for (int n = 0; n < 40; n++) {
+        grid->tree().addTile(2, Coord(128 * n, 1024, 0), 7, true);
+        grid->tree().addTile(1, Coord(8 * (n % 8), 8 * (n / 8), 0), 5, true);
+        grid->tree().addTile(1, Coord(8 * (n % 8), 8 * (n / 8), 128), 5, true);
+    }
+    grid->tree().setValueOn(Coord(100, 100, 100), 1);
+    grid->tree().setValueOn(Coord(100, 100, 228), 1);
+    File file;
+    openvdb::io::File out(file.path);
+    out.setCompression(compression);
+    out.write({ grid });
+    out.close();
+    return file.bytes();
+}
+
+/* Returns where the root of the file's tree begins: at the background value. */
+size_t tree_of(const std::string &file)
+{
+    const float background = 3;
+    return file.find(std::string((const char *)&background, sizeof background));
+}
+
+/* Inverts each byte of the tree in turn, and opens the file. Leaves out the zeros inside the nodes'
+ * masks. */
+void any_wrong_byte_of_a_node_does_no_harm(void **)
+{
+    namespace io = openvdb::io;
+    File file;
+    for (uint32_t flags : { (uint32_t)io::COMPRESS_ZIP, (uint32_t)io::COMPRESS_BLOSC,
+                            (uint32_t)(io::COMPRESS_ZIP | io::COMPRESS_ACTIVE_MASK),
+                            (uint32_t)(io::COMPRESS_BLOSC | io::COMPRESS_ACTIVE_MASK) }) {
+        const std::string whole = tiled_file(flags);
+        for (size_t at = tree_of(whole); at < whole.size(); at++) {
+            if (whole.find_first_not_of('\0', at - 8) > at)
+                continue;
+            std::string bad = whole;
+            bad[at] = (char)~bad[at];
+            file.put(bad);
+            read_whatever_it_is(file, 0);
+        }
+    }
+}
+
+/* The byte before the values of a node or leaf is 6 in an unmasked grid. For other values, the
+ * library reads the values from another byte than it skips to. */
+void masked_values_in_an_unmasked_grid_are_refused(void **)
+{
+    const std::string whole = tiled_file(openvdb::io::COMPRESS_BLOSC);
+    std::string leaf_mask(512 / 8, '\0');
+    leaf_mask[36] = 0x10; /* voxel (4, 4, 4) of the leaf */
+    const size_t top_values = tree_of(whole) + 3 * 4 + 3 * 4 + 2 * 32768 / 8;
+    const size_t leaf_values = whole.rfind(leaf_mask) + leaf_mask.size();
+    File file;
+    for (size_t at : { top_values, leaf_values })
+        for (char masking : { 0, 1, 2, 3, 4, 5, 7, -1 }) {
+            std::string bad = whole;
+            assert_int_equal(bad[at], 6);
+            bad[at] = masking;
+            file.put(bad);
+            expect_line();
+            assert_int_equal(Volume(file).status, TRIP_ERROR);
+            assert_one_line("masked values");
+        }
 }
 
 } // namespace
@@ -758,6 +829,8 @@ int main()
         cmocka_unit_test(an_interruption_ends_opening_and_decoding),
         cmocka_unit_test(a_truncated_file_is_refused),
         cmocka_unit_test(a_corrupted_file_does_no_harm),
+        cmocka_unit_test(any_wrong_byte_of_a_node_does_no_harm),
+        cmocka_unit_test(masked_values_in_an_unmasked_grid_are_refused),
     };
     return cmocka_run_group_tests(tests, nullptr, nullptr);
 }
