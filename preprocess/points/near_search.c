@@ -19,6 +19,10 @@ enum {
 /* A bound for the rounding of distances. */
 #define ROUNDING 1e-9
 
+/* LANES values. The compiler divides them for processors with shorter registers. */
+typedef double doubles __attribute__((vector_size(32)));
+typedef int64_t numbers __attribute__((vector_size(32)));
+
 typedef struct grid {
     double origin, inverse; /* of the size of a cell */
     uint32_t count;
@@ -32,7 +36,6 @@ struct trip_near_search {
     double radius2; /* that the next search tries */
     grid grids[3];  /* the last one varies fastest along the cells */
     double *unsorted[3], *sorted[3], *distances;
-    double *squares; /* of a run */
     uint32_t *cell_of, *starts, *kept;
 };
 
@@ -58,7 +61,7 @@ static size_t numbers_bytes(uint32_t candidates)
 
 size_t trip_near_search_bytes(uint32_t candidates)
 {
-    return align(sizeof(trip_near_search)) + 8 * doubles_bytes(candidates) +
+    return align(sizeof(trip_near_search)) + 7 * doubles_bytes(candidates) +
            2 * numbers_bytes(candidates) + numbers_bytes(most_cells(candidates) + 1);
 }
 
@@ -67,7 +70,7 @@ trip_near_search *trip_near_search_make(void *memory, uint32_t candidates)
     trip_near_search *s = memory;
     unsigned char *at = (unsigned char *)memory + align(sizeof *s);
     double **const tables[] = { &s->unsorted[0], &s->unsorted[1], &s->unsorted[2], &s->sorted[0],
-                                &s->sorted[1],   &s->sorted[2],   &s->distances,   &s->squares };
+                                &s->sorted[1],   &s->sorted[2],   &s->distances };
     s->room = candidates;
     s->cells_max = most_cells(candidates);
     for (size_t i = 0; i < sizeof tables / sizeof *tables; i++, at += doubles_bytes(candidates))
@@ -193,22 +196,28 @@ static double known_distance(const trip_near_search *s, const double p[3])
     return least * (1 - ROUNDING);
 }
 
+static inline void load(doubles *d, const double *from)
+{
+    memcpy(d, from, sizeof *d);
+}
+
 /* Keeps the candidates of a run of cells that are within the radius. Returns their number. */
 static inline uint32_t keep_run(const trip_near_search *s, uint32_t first, uint32_t end,
                                 const double p[3], double radius2, uint32_t kept)
 {
-    const double *restrict x = s->sorted[0] + first, *restrict y = s->sorted[1] + first,
-                           *restrict z = s->sorted[2] + first;
-    double *restrict d = s->squares;
-    const uint32_t count = end - first;
-    for (uint32_t i = 0; i < count; i++) {
-        const double dx = p[0] - x[i], dy = p[1] - y[i], dz = p[2] - z[i];
-        d[i] = dx * dx + dy * dy + dz * dz;
-    }
-    for (uint32_t i = 0; i < count; i++) {
-        s->distances[kept] = d[i];
-        s->kept[kept] = first + i;
-        kept += (d[i] <= radius2) & (d[i] > 0);
+    for (uint32_t i = first; i < end; i += LANES) {
+        doubles x, y, z;
+        load(&x, s->sorted[0] + i);
+        load(&y, s->sorted[1] + i);
+        load(&z, s->sorted[2] + i);
+        x = p[0] - x, y = p[1] - y, z = p[2] - z;
+        const doubles d = x * x + y * y + z * z;
+        const numbers near = (d <= radius2) & (d > 0); /* -1 for each */
+        for (uint32_t l = 0; l < LANES; l++) {
+            s->distances[kept] = d[l];
+            s->kept[kept] = i + l;
+            kept += (uint32_t)-near[l] & (i + l < end);
+        }
     }
     return kept;
 }
@@ -247,11 +256,13 @@ static inline bool rank_kept(const trip_near_search *s, uint32_t kept, trip_neig
     for (uint32_t i = kept; i < kept + LANES; i++)
         s->distances[i] = INFINITY;
     for (uint32_t i = 0; i < kept; i++) {
-        int64_t ranks[LANES] = { 0 };
-        for (uint32_t j = 0; j < kept; j += LANES)
-            for (int l = 0; l < LANES; l++)
-                ranks[l] += d[j + l] < d[i];
-        const int64_t rank = ranks[0] + ranks[1] + ranks[2] + ranks[3];
+        numbers nearer = { 0 }; /* -1 for each */
+        for (uint32_t j = 0; j < kept; j += LANES) {
+            doubles other;
+            load(&other, d + j);
+            nearer += other < d[i];
+        }
+        const int64_t rank = -(nearer[0] + nearer[1] + nearer[2] + nearer[3]);
         if (rank >= n->wanted)
             continue;
         if (filled >> rank & 1)

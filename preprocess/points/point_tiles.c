@@ -14,7 +14,7 @@ enum { CANDIDATES_MAX = 4 * TRIP_POINT_TILE_MAX };
 
 /* A tile of so many points ends at the border of an octant, one of twice as many at the border of
  * an octant of half the size. */
-enum { TILE_SMALL = 1536, OCTANTS = 2, PLACE_BITS = 24, TILES_FIRST = 64 };
+enum { TILE_SMALL = 1536, OCTANTS = 2, PLACE_BITS = 24, HALVINGS = 8, TILES_FIRST = 64 };
 
 enum { FAN = 8, LEVELS_MAX = 24, SLOTS_MAX = 4096, SORTED_BYTES = 1 << 17, TELL_EVERY = 1 << 14 };
 
@@ -549,21 +549,34 @@ int trip_point_tiles_search(trip_point_tiles *t, unsigned thread, uint64_t tile,
 
 /* ---- fast searches ---- */
 
-/* Returns about the distance of the last of `wanted` neighbours in a tile, if its points are even
- * on a surface or in its box. */
-static double reach_in(const trip_point_tile *tile, unsigned wanted)
+/* Returns how many halvings of the leaf the places of two rows have in common. */
+static unsigned common_halvings(const trip_point_row *one, const trip_point_row *other)
 {
-    double extent[3], least = INFINITY, all = 1;
-    for (int a = 0; a < 3; a++) {
-        extent[a] = tile->hi[a] - tile->lo[a];
-        least = fmin(least, extent[a]);
-        all *= extent[a];
+    const uint32_t differ = (uint32_t)one->head.at ^ (uint32_t)other->head.at;
+    return differ ? ((unsigned)__builtin_clz(differ) - (32 - PLACE_BITS)) / 3 : HALVINGS;
+}
+
+/* Returns about the distance of the last of `wanted` neighbours in a tile. That is the width of
+ * cells that hold wanted / pi points each, if their points lie on a surface. The rows are in the
+ * order of the octree, so the points of a cell follow each other. */
+static double reach_in(const trip_point_tiles *t, const trip_point_tile *tile,
+                       const trip_point_row *rows, unsigned wanted)
+{
+    const trip_octree *o = t->params.octree;
+    const double aim = wanted / M_PI;
+    uint32_t borders[HALVINGS + 1] = { 0 };
+    double cells = 1, above = tile->count, width = ldexp(o->side, -(int)o->nodes[rows->head.group].depth);
+    for (uint32_t i = 1; i < tile->count; i++)
+        borders[common_halvings(&rows[i - 1], &rows[i])]++;
+    for (int d = 0; d < HALVINGS; d++) {
+        cells += borders[d];
+        width /= 2;
+        const double held = tile->count / cells;
+        if (held <= aim)
+            return above > aim ? width * exp2(log(aim / held) / log(above / held)) : 2 * width;
+        above = held;
     }
-    const double area =
-        least > 0 ? all / least
-                  : fmax(extent[0] * extent[1], fmax(extent[0] * extent[2], extent[1] * extent[2]));
-    const double share = (double)wanted / tile->count;
-    return fmax(sqrt(area * share / M_PI), cbrt(all * share * 3 / (4 * M_PI)));
+    return width * sqrt(aim / above);
 }
 
 static int add_candidates(trip_point_tiles *t, unsigned thread, uint64_t tile,
@@ -583,7 +596,7 @@ int trip_point_tiles_prepare(trip_point_tiles *t, unsigned thread, uint64_t tile
     const trip_point_tile *of = &t->tiles[tile];
     trip_near_search *fast = t->fast[thread];
     const near_tiles *near = find_near(t, thread, tile);
-    const double reach = reach_in(of, wanted);
+    const double reach = reach_in(t, of, rows, wanted);
     const double margin = fmin(MARGIN * reach, sqrt(fmax(0, near->distance2)));
     bool whole = near->distance2 >= 0;
     int status = 0;
