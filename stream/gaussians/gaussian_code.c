@@ -5,6 +5,8 @@
 #include <string.h>
 #include <xxhash.h>
 
+#include "clones.h"
+
 static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "files are read as they lie in memory");
 
 enum {
@@ -15,6 +17,8 @@ enum {
     OPACITY_MAX = 4095,
     COLOUR_MAX = (1 << 14) - 1,
     HARMONIC_MAX = 127,
+    CHUNK = 64, /* a multiple of LANES */
+    LANES = 4,
 };
 
 /* Deviations below exp(-14) of the brick's largest are raised to it. */
@@ -152,52 +156,85 @@ static void find_ranges(trip_file_gaussian_brick *b, const unsigned char *const 
         b->log_lo = b->log_hi;
 }
 
-static uint64_t deviation_code(const trip_file_gaussian_brick *b, float deviation)
+static uint32_t deviation_code(const trip_file_gaussian_brick *b, float deviation)
 {
     if (!(deviation > 0))
         return 0;
-    return 1 +
-           code_of(log((double)deviation), (double)b->log_lo, (double)b->log_hi, DEVIATION_MAX - 1);
+    return 1 + (uint32_t)code_of(log((double)deviation), (double)b->log_lo, (double)b->log_hi,
+                                 DEVIATION_MAX - 1);
 }
+
+/* Values and codes of CHUNK records, so that the compiler codes several at once. */
+typedef struct chunk {
+    double centre[3][CHUNK], rotation[3][CHUNK], opacity[CHUNK], colour[3][CHUNK];
+    uint32_t centre_code[3][CHUNK], rotation_code[3][CHUNK], opacity_code[CHUNK];
+    uint32_t colour_code[3][CHUNK], deviation_code[3][CHUNK];
+    int64_t largest[CHUNK]; /* of the four numbers of a rotation */
+    double deviation[3][CHUNK]; /* decoded */
+} chunk;
 
 /* The largest of the four numbers is left out. It is positive after a change of all signs. */
-static uint64_t rotation_code(const float rotation[4])
+static void load_rotation(chunk *k, unsigned i, const float rotation[4])
 {
     int largest = 0;
-    for (int i = 1; i < 4; i++)
-        if (fabsf(rotation[i]) > fabsf(rotation[largest]))
-            largest = i;
+    for (int n = 1; n < 4; n++)
+        largest = fabsf(rotation[n]) > fabsf(rotation[largest]) ? n : largest;
     const double sign = rotation[largest] < 0 ? -1 : 1;
-    uint64_t code = (uint64_t)largest;
-    for (int i = 0, at = 2; i < 4; i++) {
-        if (i == largest)
-            continue;
-        code |= code_of(sign * (double)rotation[i], -SQRT_HALF, SQRT_HALF, ROTATION_MAX) << at;
-        at += 12;
-    }
-    return code;
+    k->largest[i] = largest;
+    for (int n = 0; n < 3; n++)
+        k->rotation[n][i] = sign * (double)rotation[n + (n >= largest)];
 }
 
-static uint64_t colour_code(const trip_file_gaussian_brick *b, const trip_gaussian *g, int c)
+/* Loads records. The last one fills the rest of the chunk. */
+static void load_chunk(chunk *k, const trip_file_gaussian_brick *b,
+                       const unsigned char *const *splats, unsigned count)
 {
-    return code_of((double)g->sh[0][c], (double)b->colour_lo[c], (double)b->colour_hi[c],
-                   COLOUR_MAX);
+    for (unsigned i = 0; i < CHUNK; i++) {
+        const trip_gaussian *g = (const void *)splats[i < count ? i : count - 1];
+        uint32_t code = 0; /* of the last deviation; often the next one has it too */
+        for (int a = 0; a < 3; a++) {
+            k->centre[a][i] = g->centre[a];
+            k->colour[a][i] = (double)g->sh[0][a];
+            if (i < count && (a == 0 || g->deviations[a] != g->deviations[a - 1]))
+                code = deviation_code(b, g->deviations[a]);
+            k->deviation_code[a][i] = code;
+        }
+        k->opacity[i] = (double)g->opacity;
+        load_rotation(k, i, g->rotation);
+    }
 }
 
-static words pack(const trip_file_gaussian_brick *b, const trip_gaussian *g)
+/* Sets the codes of values in [lo, hi], 0 to `max`. */
+static inline void set_codes(const double *restrict values, double lo, double hi, int max,
+                             uint32_t *restrict codes)
+{
+    const double range = hi > lo ? hi - lo : INFINITY;
+    for (int i = 0; i < CHUNK; i++)
+        codes[i] = (uint32_t)(int32_t)(lowest((values[i] - lo) / range, 0, 1) * max + 0.5);
+}
+
+static inline void code_chunk(chunk *k, const trip_file_gaussian_brick *b)
+{
+    for (int a = 0; a < 3; a++) {
+        set_codes(k->centre[a], b->centre_lo[a], b->centre_hi[a], CENTRE_MAX, k->centre_code[a]);
+        set_codes(k->rotation[a], -SQRT_HALF, SQRT_HALF, ROTATION_MAX, k->rotation_code[a]);
+        set_codes(k->colour[a], (double)b->colour_lo[a], (double)b->colour_hi[a], COLOUR_MAX,
+                  k->colour_code[a]);
+    }
+    set_codes(k->opacity, 0, 1, OPACITY_MAX, k->opacity_code);
+}
+
+static words pack(const chunk *k, unsigned i)
 {
     words r = { { 0 } };
-    uint64_t code = 0; /* of the last deviation; often the next one has it too */
+    r.w[1] = (uint64_t)k->largest[i] | (uint64_t)k->opacity_code[i] << 38 |
+             (uint64_t)k->colour_code[0][i] << 50;
     for (int a = 0; a < 3; a++) {
-        r.w[0] |= code_of(g->centre[a], b->centre_lo[a], b->centre_hi[a], CENTRE_MAX)
-                  << CENTRE_BITS * a;
-        if (a == 0 || g->deviations[a] != g->deviations[a - 1])
-            code = deviation_code(b, g->deviations[a]);
-        r.w[2] |= code << 12 * a;
+        r.w[0] |= (uint64_t)k->centre_code[a][i] << CENTRE_BITS * a;
+        r.w[1] |= (uint64_t)k->rotation_code[a][i] << (2 + 12 * a);
+        r.w[2] |= (uint64_t)k->deviation_code[a][i] << 12 * a;
     }
-    r.w[1] = rotation_code(g->rotation) | code_of((double)g->opacity, 0, 1, OPACITY_MAX) << 38 |
-             colour_code(b, g, 0) << 50;
-    r.w[2] |= colour_code(b, g, 1) << 36 | colour_code(b, g, 2) << 50;
+    r.w[2] |= (uint64_t)k->colour_code[1][i] << 36 | (uint64_t)k->colour_code[2][i] << 50;
     return r;
 }
 
@@ -274,22 +311,138 @@ static void decode_shape(const trip_file_gaussian_brick *b, words r, trip_gaussi
     out->opacity = (float)bits(r.w[1], 38, 12) / OPACITY_MAX;
 }
 
-/* Finds the bounds of the decoded records, since a reader draws them. */
-static void find_reach(trip_file_gaussian_brick *b, const unsigned char *records, unsigned count)
+/* Sums of the bounds of records, LANES at once. */
+typedef struct reach {
+    double lo[3][LANES], hi[3][LANES];
+} reach;
+
+static void begin_reach(reach *r, const trip_file_gaussian_brick *b)
 {
-    b->opacity_max = 0;
     for (int a = 0; a < 3; a++)
-        b->reach_lo[a] = b->centre_lo[a], b->reach_hi[a] = b->centre_hi[a];
-    for (unsigned i = 0; i < count; i++) {
-        const unsigned char *record = records + (size_t)i * TRIP_GAUSSIAN_RECORD_BYTES;
-        trip_gaussian g;
-        double half[3];
-        trip_gaussian_decode_centre(b, record, g.centre);
-        decode_shape(b, load(record), &g);
-        trip_gaussian_half_extents(&g, half);
-        include(b->reach_lo, b->reach_hi, g.centre, half);
-        b->opacity_max = g.opacity > b->opacity_max ? g.opacity : b->opacity_max;
+        for (int l = 0; l < LANES; l++)
+            r->lo[a][l] = b->centre_lo[a], r->hi[a][l] = b->centre_hi[a];
+}
+
+static void end_reach(const reach *r, trip_file_gaussian_brick *b)
+{
+    for (int a = 0; a < 3; a++) {
+        b->reach_lo[a] = r->lo[a][0], b->reach_hi[a] = r->hi[a][0];
+        for (int l = 1; l < LANES; l++) {
+            b->reach_lo[a] = fmin(b->reach_lo[a], r->lo[a][l]);
+            b->reach_hi[a] = fmax(b->reach_hi[a], r->hi[a][l]);
+        }
     }
+}
+
+static void decode_deviations(chunk *k, const trip_file_gaussian_brick *b, unsigned count)
+{
+    for (unsigned i = 0; i < CHUNK; i++)
+        for (int a = 0; a < 3; a++)
+            k->deviation[a][i] =
+                i >= count ? k->deviation[a][count - 1]
+                : a > 0 && k->deviation_code[a][i] == k->deviation_code[a - 1][i]
+                    ? k->deviation[a - 1][i]
+                    : (double)decode_deviation(b, k->deviation_code[a][i]);
+}
+
+/* Decodes the rotations as decode_rotation() does, by selection instead of jumps. */
+static inline void decode_rotations(const chunk *k, double q[4][CHUNK])
+{
+    for (int i = 0; i < CHUNK; i++) {
+        const double u = (k->rotation_code[0][i] * (2.0 / ROTATION_MAX) - 1) * SQRT_HALF,
+                     v = (k->rotation_code[1][i] * (2.0 / ROTATION_MAX) - 1) * SQRT_HALF,
+                     t = (k->rotation_code[2][i] * (2.0 / ROTATION_MAX) - 1) * SQRT_HALF;
+        const double sum = u * u + v * v + t * t, rest = 1 - sum;
+        const double most = sqrt(rest > 0 ? rest : 0), length = sqrt(sum),
+                     scale = sum < 1 ? 1 : 1 / length;
+        const int64_t at = k->largest[i];
+        q[0][i] = (double)(float)((at == 0 ? most : u) * scale);
+        q[1][i] = (double)(float)((at == 1 ? most : at == 0 ? u : v) * scale);
+        q[2][i] = (double)(float)((at == 2 ? most : at < 2 ? v : t) * scale);
+        q[3][i] = (double)(float)((at == 3 ? most : t) * scale);
+    }
+}
+
+/* Sets the extents of CHUNK records along an axis as trip_gaussian_half_extents() does, from a row
+ * of their matrices. */
+static inline void set_half(const chunk *k, const double *restrict r0, const double *restrict r1,
+                            const double *restrict r2, double *restrict half)
+{
+    for (int i = 0; i < CHUNK; i++) {
+        const double x = r0[i] * k->deviation[0][i], y = r1[i] * k->deviation[1][i],
+                     z = r2[i] * k->deviation[2][i];
+        half[i] = TRIP_GAUSSIAN_REACH * sqrt(x * x + y * y + z * z);
+    }
+}
+
+static inline void find_halves(const chunk *k, double half[3][CHUNK])
+{
+    double q[4][CHUNK], r[3][3][CHUNK];
+    decode_rotations(k, q);
+    for (int i = 0; i < CHUNK; i++) {
+        const double w = q[0][i], x = q[1][i], y = q[2][i], z = q[3][i];
+        r[0][0][i] = 1 - 2 * (y * y + z * z);
+        r[0][1][i] = 2 * (x * y - w * z);
+        r[0][2][i] = 2 * (x * z + w * y);
+        r[1][0][i] = 2 * (x * y + w * z);
+        r[1][1][i] = 1 - 2 * (x * x + z * z);
+        r[1][2][i] = 2 * (y * z - w * x);
+        r[2][0][i] = 2 * (x * z - w * y);
+        r[2][1][i] = 2 * (y * z + w * x);
+        r[2][2][i] = 1 - 2 * (x * x + y * y);
+    }
+    for (int a = 0; a < 3; a++)
+        set_half(k, r[a][0], r[a][1], r[a][2], half[a]);
+}
+
+static inline void include_along(const uint32_t *restrict codes, const double *restrict half,
+                                 double lo, double hi, double *restrict least,
+                                 double *restrict most)
+{
+    const double step = (hi - lo) * (1.0 / CENTRE_MAX);
+    for (int i = 0; i < CHUNK; i += LANES)
+        for (int l = 0; l < LANES; l++) {
+            const double up = lo + (int32_t)codes[i + l] * step, at = up < hi ? up : hi;
+            const double below = at - half[i + l], above = at + half[i + l];
+            least[l] = below < least[l] ? below : least[l];
+            most[l] = above > most[l] ? above : most[l];
+        }
+}
+
+/* Includes the bounds of the decoded records, since a reader draws them. */
+static inline void include_chunk(reach *to, const chunk *k, const trip_file_gaussian_brick *b)
+{
+    double half[3][CHUNK];
+    find_halves(k, half);
+    for (int a = 0; a < 3; a++)
+        include_along(k->centre_code[a], half[a], b->centre_lo[a], b->centre_hi[a], to->lo[a],
+                      to->hi[a]);
+}
+
+static float most_opacity(const chunk *k)
+{
+    uint32_t most = 0;
+    for (int i = 0; i < CHUNK; i++)
+        most = k->opacity_code[i] > most ? k->opacity_code[i] : most;
+    return (float)most / OPACITY_MAX;
+}
+
+/* Codes up to CHUNK records and includes their bounds. */
+TRIP_ALSO_V3
+static void encode_chunk(trip_file_gaussian_brick *b, reach *to, const unsigned char *const *splats,
+                         unsigned count, unsigned char *plane)
+{
+    chunk k;
+    load_chunk(&k, b, splats, count);
+    code_chunk(&k, b);
+    for (unsigned i = 0; i < count; i++) {
+        const words r = pack(&k, i);
+        memcpy(plane + i * sizeof r, &r, sizeof r);
+    }
+    decode_deviations(&k, b, count);
+    include_chunk(to, &k, b);
+    const float opacity = most_opacity(&k);
+    b->opacity_max = opacity > b->opacity_max ? opacity : b->opacity_max;
 }
 
 void trip_gaussian_encode(trip_file_gaussian_brick *b, const trip_file_gaussian_header *h,
@@ -298,17 +451,19 @@ void trip_gaussian_encode(trip_file_gaussian_brick *b, const trip_file_gaussian_
 {
     const int degree = (int)h->degree, own = h->flags & TRIP_GAUSSIAN_PALETTE ? 0 : degree;
     const unsigned plane_count = trip_gaussian_plane_count(h, degree);
+    reach bounds;
     find_ranges(b, splats, count, own);
     b->records = count;
-    for (unsigned i = 0; i < count; i++) {
-        const trip_gaussian *g = (const void *)splats[i];
-        const words r = pack(b, g);
-        memcpy(planes[0] + i * sizeof r, &r, sizeof r);
+    b->opacity_max = 0;
+    begin_reach(&bounds, b);
+    for (unsigned i = 0; i < count; i += CHUNK)
+        encode_chunk(b, &bounds, splats + i, count - i < CHUNK ? count - i : CHUNK,
+                     planes[0] + (size_t)i * TRIP_GAUSSIAN_RECORD_BYTES);
+    end_reach(&bounds, b);
+    for (unsigned i = 0; i < count && own > 0; i++)
         for (int n = 1; n <= own; n++)
-            pack_harmonics(b->scale[n - 1], g->sh, n,
+            pack_harmonics(b->scale[n - 1], ((const trip_gaussian *)(const void *)splats[i])->sh, n,
                            planes[n] + i * trip_gaussian_plane_bytes(h, (unsigned)n));
-    }
-    find_reach(b, planes[0], count);
     for (unsigned n = 0; n < TRIP_GAUSSIAN_PLANES; n++)
         b->checksums[n] = n < plane_count
                               ? XXH64(planes[n], count * (size_t)trip_gaussian_plane_bytes(h, n), 0)
