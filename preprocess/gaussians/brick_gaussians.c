@@ -161,7 +161,6 @@ static int take_room_of_sample(bricker *b, uint64_t records)
 
 static int spool_splat(bricker *b, trip_gaussian *g)
 {
-    unsigned char spilled[sizeof(trip_spilled) + sizeof *g] = { 0 };
     const trip_spilled head = { .number = b->records };
     tell_progress(b, 1);
     if (!repair(g, b->p->degree)) {
@@ -178,9 +177,9 @@ static int spool_splat(bricker *b, trip_gaussian *g)
     b->class_lo = class_index < b->class_lo ? class_index : b->class_lo;
     b->class_hi = class_index > b->class_hi ? class_index : b->class_hi;
     b->records++;
-    memcpy(spilled, &head, sizeof head);
-    memcpy(spilled + sizeof head, g, sizeof *g);
-    const int status = trip_output_append(&b->spool, spilled, b->stride);
+    int status = trip_output_append(&b->spool, &head, sizeof head);
+    if (status == TRIP_OK)
+        status = trip_output_append(&b->spool, g, b->stride - sizeof head);
     return status == TRIP_OK && b->p->octree ? trip_gaussian_levels_count(b->levels, g) : status;
 }
 

@@ -1,5 +1,6 @@
 #include "gaussian_levels.h"
 
+#include <assert.h>
 #include <math.h>
 #include <string.h>
 
@@ -17,6 +18,8 @@ enum {
 
 /* A Gaussian is merged if its deviations are at most this part of a voxel's width. */
 #define MERGED_PART 0.75
+
+static_assert((int)VOXELS < 64, "each depth has a bit");
 
 /* A node of the octree. */
 typedef struct part {
@@ -51,6 +54,7 @@ struct trip_gaussian_levels {
     unsigned deepest;
     uint64_t coarse;
     voxel voxels[VOXELS];
+    uint64_t open; /* a bit for each depth with an open voxel */
     /* These belong to the second pass. */
     size_t batch; /* the most Gaussians of each table below */
     void *tables;
@@ -191,6 +195,7 @@ static void add_to_voxel(trip_gaussian_levels *l, unsigned depth, const trip_gau
                          const trip_gaussian_moments *moments)
 {
     voxel *v = &l->voxels[depth];
+    l->open |= UINT64_C(1) << depth;
     if (!l->merges) {
         v->moments.count += moments->count;
         return;
@@ -200,14 +205,12 @@ static void add_to_voxel(trip_gaussian_levels *l, unsigned depth, const trip_gau
     trip_gaussian_moments_add(&v->moments, moments, l->p.degree);
 }
 
-/* Closes the voxel at a depth: counts or emits it for the nodes around it, and adds it to the voxel
- * around it. */
+/* Closes the open voxel at a depth: counts or emits it for the nodes around it, and adds it to the
+ * voxel around it. */
 static int close_voxel(trip_gaussian_levels *l, unsigned depth)
 {
     voxel *v = &l->voxels[depth];
     int status = TRIP_OK;
-    if (!v->moments.count)
-        return TRIP_OK;
     for (unsigned k = 1; k <= TRIP_LEVEL_HALVINGS && k <= depth && status == TRIP_OK; k++) {
         if (depth - k >= l->depth)
             continue;
@@ -223,14 +226,16 @@ static int close_voxel(trip_gaussian_levels *l, unsigned depth)
         add_to_voxel(l, depth - 1, &v->first, &v->moments);
     }
     v->moments.count = 0;
+    l->open &= ~(UINT64_C(1) << depth);
     return status;
 }
 
-static int close_below(trip_gaussian_levels *l, unsigned common)
+/* Closes the open voxels at a depth and below it. */
+static int close_from(trip_gaussian_levels *l, unsigned depth)
 {
     int status = TRIP_OK;
-    for (unsigned depth = VOXELS - 1; depth > common && status == TRIP_OK; depth--)
-        status = close_voxel(l, depth);
+    while (status == TRIP_OK && l->open >> depth)
+        status = close_voxel(l, 63 - (unsigned)__builtin_clzll(l->open));
     return status;
 }
 
@@ -264,13 +269,16 @@ static int add(trip_gaussian_levels *l, const trip_gaussian *g, bool has_mass,
                const trip_gaussian_moments *own)
 {
     const trip_octree_place place = trip_octree_place_of(l->p.octree, g->centre);
-    int status = l->any ? close_below(l, trip_octree_common(&l->place, &place)) : TRIP_OK;
-    const uint64_t leaf = trip_octree_leaf(l->p.octree, &place, l->path);
+    const unsigned common = l->any ? trip_octree_common(&l->place, &place) : 0;
+    int status = close_from(l, common + 1);
+    if (!l->any || common < l->depth) { /* another leaf */
+        const uint64_t leaf = trip_octree_leaf(l->p.octree, &place, l->path);
+        l->depth = l->p.octree->nodes[leaf].depth;
+    }
     l->any = true;
     l->place = place;
-    l->depth = l->p.octree->nodes[leaf].depth;
     if (!l->merges)
-        l->parts[leaf].records++;
+        l->parts[l->path[l->depth]].records++;
     if (status < 0 || g->opacity * 255 <= 1)
         return status;
     const int merging = has_mass ? merging_depth(l, g, l->depth + TRIP_LEVEL_HALVINGS - 1) : -1;
@@ -331,9 +339,8 @@ static uint64_t select_node(trip_gaussian_levels *l, uint64_t node)
 
 static int close_all(trip_gaussian_levels *l)
 {
-    int status = l->any ? close_below(l, 0) : TRIP_OK;
     l->any = false;
-    return status == TRIP_OK ? close_voxel(l, 0) : status;
+    return close_from(l, 0);
 }
 
 bool trip_gaussian_levels_select(trip_gaussian_levels *l)

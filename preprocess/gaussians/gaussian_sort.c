@@ -15,6 +15,7 @@ enum {
     RECORDS_MIN = 1024,    /* of a run */
     READ_SPLATS = 1024,    /* are read at once */
     CHECK_EVERY = 1 << 14, /* splats between two checks for an interruption */
+    AHEAD = 8,             /* splats that are fetched before their turn */
 };
 
 /* A run that is merged. It lies in memory, sorted by keys, or in the file of runs. */
@@ -71,6 +72,13 @@ static const trip_gaussian *splat(const unsigned char *spilled)
     return (const void *)(spilled + sizeof(trip_spilled));
 }
 
+static void fetch(const unsigned char *spilled, size_t bytes)
+{
+    enum { CACHE_LINE = 64 };
+    for (size_t at = 0; at < bytes; at += CACHE_LINE)
+        __builtin_prefetch(spilled + at);
+}
+
 /* ---- runs ---- */
 
 static size_t run_length(const sorter *s, uint64_t number)
@@ -122,8 +130,11 @@ static int sort_run(const sorter *s, uint64_t number, unsigned char *slice)
     if (status < 0)
         return status;
     trip_key_sort(keys, scratch, count);
-    for (size_t i = 0; i < count; i++)
+    for (size_t i = 0; i < count; i++) {
+        if (i + AHEAD < count)
+            __builtin_prefetch(slice + keys[i + AHEAD].number * s->stride);
         keys[i].key = head(slice + keys[i].number * s->stride)->group;
+    }
     trip_key_sort(keys, scratch, count);
     if (s->p->count)
         count_groups(s, keys, count);
@@ -140,8 +151,11 @@ static int spill_run(const sorter *s, uint64_t number, unsigned char *slice)
     int status = TRIP_OK;
     for (size_t i = 0; i < count && status == TRIP_OK;) {
         size_t n = 0;
-        for (; n < most && i < count; n++, i++)
+        for (; n < most && i < count; n++, i++) {
+            if (i + AHEAD < count)
+                fetch(slice + keys[i + AHEAD].number * s->stride, s->stride);
             memcpy(buffer + n * s->stride, slice + keys[i].number * s->stride, s->stride);
+        }
         status = trip_output_patch(&s->file, at, buffer, n * s->stride);
         at += n * s->stride;
     }
@@ -198,6 +212,8 @@ static int advance(const sorter *s, run *r, size_t room)
 {
     if (r->keys) {
         r->keys++;
+        if (r->left > AHEAD)
+            fetch(r->buffer + r->keys[AHEAD - 1].number * s->stride, s->stride);
         r->head = --r->left ? r->buffer + r->keys->number * s->stride : NULL;
         return TRIP_OK;
     }

@@ -209,8 +209,12 @@ static inline void set_codes(const double *restrict values, double lo, double hi
                              uint32_t *restrict codes)
 {
     const double range = hi > lo ? hi - lo : INFINITY;
-    for (int i = 0; i < CHUNK; i++)
-        codes[i] = (uint32_t)(int32_t)(lowest((values[i] - lo) / range, 0, 1) * max + 0.5);
+    for (int i = 0; i < CHUNK; i++) {
+        double part = (values[i] - lo) / range;
+        part = part < 0 ? 0 : part;
+        part = part > 1 ? 1 : part;
+        codes[i] = (uint32_t)(int32_t)(part * max + 0.5);
+    }
 }
 
 static inline void code_chunk(chunk *k, const trip_file_gaussian_brick *b)
