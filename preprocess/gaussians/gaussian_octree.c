@@ -135,7 +135,8 @@ bool trip_octree_build(trip_octree *o, const trip_gaussian_sample *sample, uint6
     *o = (trip_octree){ .leaf_aim = leaf_aim, .budget = budget };
     set_cube(o, lo, hi);
     trip_key *keys = trip_budget_take(budget, bytes);
-    build b = { o, sample, keys, keys + sample->count + 1, (uint64_t)((double)leaf_aim * share) };
+    build b = { o, sample, keys, keys + sample->count + 1,
+                (uint64_t)fmax(1, (double)leaf_aim * share) };
     for (uint64_t i = 0; keys && i < sample->count; i++)
         keys[i].number = i;
     o->room = keys ? count_nodes(&b, 0, sample->count, 0) : 0;

@@ -15,7 +15,9 @@ typedef struct build {
 static uint64_t sample_stride(uint64_t records)
 {
     const uint64_t stride = records / SAMPLE_WHOLE;
-    return stride < 1 ? 1 : stride > SAMPLE_STRIDE ? SAMPLE_STRIDE : stride;
+    const uint64_t least = (records + TRIP_GAUSSIAN_SAMPLE_MAX - 1) / TRIP_GAUSSIAN_SAMPLE_MAX;
+    const uint64_t usual = stride < 1 ? 1 : stride > SAMPLE_STRIDE ? SAMPLE_STRIDE : stride;
+    return usual > least ? usual : least;
 }
 
 int trip_gaussian_is_sampled(uint64_t number, uint64_t records)

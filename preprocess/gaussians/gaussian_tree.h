@@ -10,7 +10,8 @@
 #include "key_sort.h"
 
 enum {
-    TRIP_GAUSSIAN_BRICK_AIM = 4096, /* records of a brick, about */
+    TRIP_GAUSSIAN_BRICK_AIM = 4096,     /* records of a brick, about */
+    TRIP_GAUSSIAN_SAMPLE_MAX = 1 << 22, /* points of a sample, so that any scene fits into memory */
 };
 
 typedef struct trip_gaussian_point {
@@ -45,7 +46,8 @@ typedef struct trip_gaussian_tree {
 
 /* Whether a record belongs to the sample, from its number and the number of records. */
 int trip_gaussian_is_sampled(uint64_t number, uint64_t records);
-/* Returns the largest number of points in a sample of so many records. */
+/* Returns the largest number of points in a sample of so many records. It is at most
+ * TRIP_GAUSSIAN_SAMPLE_MAX + 1. */
 uint64_t trip_gaussian_sample_room(uint64_t records);
 
 /* `records` counts the records of each group. Returns false if the budget is too small. */

@@ -565,7 +565,8 @@ static double reach_in(const trip_point_tiles *t, const trip_point_tile *tile,
     const trip_octree *o = t->params.octree;
     const double aim = wanted / M_PI;
     uint32_t borders[HALVINGS + 1] = { 0 };
-    double cells = 1, above = tile->count, width = ldexp(o->side, -(int)o->nodes[rows->head.group].depth);
+    double cells = 1, above = tile->count,
+           width = ldexp(o->side, -(int)o->nodes[rows->head.group].depth);
     for (uint32_t i = 1; i < tile->count; i++)
         borders[common_halvings(&rows[i - 1], &rows[i])]++;
     for (int d = 0; d < HALVINGS; d++) {

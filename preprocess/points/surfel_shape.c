@@ -1,8 +1,10 @@
 #include "surfel_shape.h"
 
+#include <assert.h>
 #include <math.h>
 #include <string.h>
 
+#include "clones.h"
 #include "geometry.h"
 
 enum { SWEEPS = 12, NEWTON_STEPS = 12 };
@@ -128,51 +130,54 @@ static trip_vec3 normal_of(double variance[3][3], trip_vec3 towards)
     return trip_dot(n, towards) < 0 ? trip_scale(n, -1) : n;
 }
 
+/* A value without meaning, then x, y and z. */
+typedef double vector __attribute__((vector_size(32)));
+
+static_assert(sizeof(trip_neighbour) == sizeof(vector), "a neighbour is a vector");
+
+/* y, z, x. A function would pass vectors in other registers on other processors. */
+#define TURNED(v) __builtin_shufflevector(v, v, 0, 2, 3, 1)
+
 /* Sums over the neighbours' offsets from the point, in units of their reach. The point adds 0. */
 typedef struct sums {
-    double offset[3];
-    double xx, xy, xz, yy, yz, zz;
+    vector offset;
+    vector squares; /* xx, yy, zz */
+    vector crosses; /* xy, yz, zx */
 } sums;
 
-static sums sum_offsets(const trip_neighbours *n, double unit)
+static inline void sum_offsets(const trip_neighbours *n, double unit, sums *s)
 {
-    sums s = { .xx = 0 };
+    const vector from = { 0, n->position[0], n->position[1], n->position[2] };
     const double part = 1 / unit;
+    *s = (sums){ .offset = { 0 } };
     for (unsigned i = 0; i < n->count; i++) {
-        const double *p = n->nearest[i].position;
-        const double x = (p[0] - n->position[0]) * part, y = (p[1] - n->position[1]) * part,
-                     z = (p[2] - n->position[2]) * part;
-        s.offset[0] += x;
-        s.offset[1] += y;
-        s.offset[2] += z;
-        s.xx += x * x;
-        s.xy += x * y;
-        s.xz += x * z;
-        s.yy += y * y;
-        s.yz += y * z;
-        s.zz += z * z;
+        vector v;
+        memcpy(&v, &n->nearest[i], sizeof v);
+        v = (v - from) * part;
+        s->offset += v;
+        s->squares += v * v;
+        s->crosses += v * TURNED(v);
     }
-    return s;
 }
 
 /* Returns the mean square distance of the neighbours from their mean. */
-static double spread2(const sums *s, double count)
+static inline double spread2(const sums *s, double count)
 {
-    const double mean2 =
-        (s->offset[0] * s->offset[0] + s->offset[1] * s->offset[1] + s->offset[2] * s->offset[2]) /
-        (count * count);
-    return fmax(0, (s->xx + s->yy + s->zz) / count - mean2);
+    const vector o = s->offset * s->offset;
+    return fmax(0, (s->squares[1] + s->squares[2] + s->squares[3]) / count -
+                       (o[1] + o[2] + o[3]) / (count * count));
 }
 
 /* Sets the covariances of the neighbours and the point. */
-static void set_variance(const sums *s, double count, double variance[3][3])
+static inline void set_variance(const sums *s, double count, double variance[3][3])
 {
-    const double squares[3][3] = { { s->xx, s->xy, s->xz },
-                                   { s->xy, s->yy, s->yz },
-                                   { s->xz, s->yz, s->zz } };
+    const vector along = s->squares / count - s->offset * s->offset / count / count;
+    const vector across = s->crosses / count - s->offset * TURNED(s->offset) / count / count;
     for (int a = 0; a < 3; a++)
-        for (int b = 0; b < 3; b++)
-            variance[a][b] = squares[a][b] / count - s->offset[a] * s->offset[b] / count / count;
+        variance[a][a] = along[a + 1];
+    variance[0][1] = variance[1][0] = across[1];
+    variance[1][2] = variance[2][1] = across[2];
+    variance[2][0] = variance[0][2] = across[3];
 }
 
 static double variance_along(const double variance[3][3], trip_vec3 axis)
@@ -184,6 +189,7 @@ static double variance_along(const double variance[3][3], trip_vec3 axis)
     return fmax(0, sum);
 }
 
+TRIP_ALSO_V3
 trip_surfel_shape trip_surfel_shape_of(const trip_neighbours *n, const double towards[3])
 {
     trip_vec3 to = trip_v3(towards[0], towards[1], towards[2]);
@@ -195,7 +201,8 @@ trip_surfel_shape trip_surfel_shape_of(const trip_neighbours *n, const double to
         return s;
     double variance[3][3], turned[3][3], reach = sqrt(n->nearest[n->count - 1].distance2);
     const double unit = reach;
-    const sums all = sum_offsets(n, reach);
+    sums all;
+    sum_offsets(n, reach, &all);
     set_variance(&all, n->count + 1, variance);
     memcpy(turned, variance, sizeof turned);
     if (n->count >= TRIP_NEIGHBOURS_MIN)

@@ -169,7 +169,7 @@ typedef struct chunk {
     double centre[3][CHUNK], rotation[3][CHUNK], opacity[CHUNK], colour[3][CHUNK];
     uint32_t centre_code[3][CHUNK], rotation_code[3][CHUNK], opacity_code[CHUNK];
     uint32_t colour_code[3][CHUNK], deviation_code[3][CHUNK];
-    int64_t largest[CHUNK]; /* of the four numbers of a rotation */
+    int64_t largest[CHUNK];     /* of the four numbers of a rotation */
     double deviation[3][CHUNK]; /* decoded */
 } chunk;
 
@@ -342,11 +342,10 @@ static void decode_deviations(chunk *k, const trip_file_gaussian_brick *b, unsig
 {
     for (unsigned i = 0; i < CHUNK; i++)
         for (int a = 0; a < 3; a++)
-            k->deviation[a][i] =
-                i >= count ? k->deviation[a][count - 1]
-                : a > 0 && k->deviation_code[a][i] == k->deviation_code[a - 1][i]
-                    ? k->deviation[a - 1][i]
-                    : (double)decode_deviation(b, k->deviation_code[a][i]);
+            k->deviation[a][i] = i >= count ? k->deviation[a][count - 1]
+                                 : a > 0 && k->deviation_code[a][i] == k->deviation_code[a - 1][i]
+                                     ? k->deviation[a - 1][i]
+                                     : (double)decode_deviation(b, k->deviation_code[a][i]);
 }
 
 /* Decodes the rotations as decode_rotation() does, by selection instead of jumps. */

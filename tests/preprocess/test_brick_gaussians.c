@@ -486,6 +486,29 @@ static void threads_and_equal_centres_do_not_change_the_bytes(void **state)
     }
 }
 
+/* A sample of 4 million points or fewer fits into memory. Each stride of numbers has one point. */
+static void samples_of_any_scene_fit_into_memory(void **state)
+{
+    static const struct {
+        uint64_t records, stride;
+    } cases[] = { { 1 << 20, 64 },
+                  { UINT64_C(1) << 28, 64 },
+                  { UINT64_C(1000000000), 239 },
+                  { UINT64_C(1) << 40, 1 << 18 } };
+    (void)state;
+    for (size_t c = 0; c < sizeof cases / sizeof *cases; c++) {
+        const uint64_t stride = cases[c].stride, first = cases[c].records / 2 / stride * stride;
+        assert_true(trip_gaussian_sample_room(cases[c].records) <= (1 << 22) + 1);
+        for (uint64_t block = 0; block < 8; block++) {
+            unsigned sampled = 0;
+            for (uint64_t i = 0; i < stride; i++)
+                sampled +=
+                    trip_gaussian_is_sampled(first + block * stride + i, cases[c].records) != 0;
+            assert_int_equal(sampled, 1);
+        }
+    }
+}
+
 static void strays_do_no_harm(void **state)
 {
     (void)state;
@@ -916,6 +939,7 @@ int main(void)
         cmocka_unit_test(a_stream_takes_the_memory_that_its_plan_tells),
         cmocka_unit_test(little_memory_suffices_and_gives_the_same_bytes),
         cmocka_unit_test(threads_and_equal_centres_do_not_change_the_bytes),
+        cmocka_unit_test(samples_of_any_scene_fit_into_memory),
         cmocka_unit_test(strays_do_no_harm),
         cmocka_unit_test(bricks_are_compact_and_full),
         cmocka_unit_test(splats_that_reach_into_a_view_are_not_left_out),
