@@ -591,27 +591,40 @@ static int add_candidates(trip_point_tiles *t, unsigned thread, uint64_t tile,
     return status;
 }
 
+/* Collects the candidates at most `margin` outside of a tile. Sets *whole to false if there are too
+ * many. */
+static int collect(trip_point_tiles *t, unsigned thread, const trip_point_row *rows, double margin,
+                   double reach, bool *whole)
+{
+    const near_tiles *near = &t->near[thread];
+    const trip_point_tile *of = &t->tiles[near->of];
+    trip_near_search *fast = t->fast[thread];
+    int status = 0;
+    *whole = true;
+    trip_near_search_begin(fast, of->lo, of->hi, margin, reach);
+    for (uint32_t i = 0; i < of->count && *whole; i++)
+        *whole = trip_near_search_add(fast, rows[i].position);
+    for (unsigned i = 0; i < near->count && status == 0 && *whole; i++)
+        if (apart2(near->tiles[i].box.lo, near->tiles[i].box.hi, of) <= margin * margin)
+            status = add_candidates(t, thread, near->tiles[i].tile, fast, whole);
+    return status;
+}
+
 int trip_point_tiles_prepare(trip_point_tiles *t, unsigned thread, uint64_t tile,
                              const trip_point_row *rows, unsigned wanted)
 {
+    enum { TRIES = 4 };
     const trip_point_tile *of = &t->tiles[tile];
-    trip_near_search *fast = t->fast[thread];
     const near_tiles *near = find_near(t, thread, tile);
     const double reach = reach_in(t, of, rows, wanted);
-    const double margin = fmin(MARGIN * reach, sqrt(fmax(0, near->distance2)));
-    bool whole = near->distance2 >= 0;
+    double margin = fmin(MARGIN * reach, sqrt(fmax(0, near->distance2)));
+    bool whole = false;
     int status = 0;
-    t->prepared[thread] = false;
-    trip_near_search_begin(fast, of->lo, of->hi, margin, reach);
-    for (uint32_t i = 0; i < of->count && whole; i++)
-        whole = trip_near_search_add(fast, rows[i].position);
-    for (unsigned i = 0; i < near->count && status == 0 && whole; i++)
-        if (apart2(near->tiles[i].box.lo, near->tiles[i].box.hi, of) <= margin * margin)
-            status = add_candidates(t, thread, near->tiles[i].tile, fast, &whole);
-    if (status == 0 && whole) {
-        trip_near_search_sort(fast);
-        t->prepared[thread] = true;
-    }
+    for (int i = 0; i < TRIES && near->distance2 >= 0 && status == 0 && !whole; i++, margin /= 2)
+        status = collect(t, thread, rows, margin, reach, &whole);
+    t->prepared[thread] = status == 0 && whole;
+    if (t->prepared[thread])
+        trip_near_search_sort(t->fast[thread]);
     return status;
 }
 
