@@ -31,6 +31,7 @@ static const measure_column selection_columns[] = {
     { "in_view", "in view", 0, 0 },
     { "surfels", "millions of surfels in view", 3, 1e6 },
     { "culled", "culled", 3, 0 },
+    { "away", "in bricks facing away", 3, 0 },
     { "without_fps", "frames/s without", 2, 0 },
     { "fps", "with selection", 2, 0 },
     { "speedup", "ratio", 2, 0 },
@@ -57,6 +58,7 @@ typedef struct measured {
     double ms[REPEAT_MAX];
     trip_surfel_frame_stats stats;  /* of the last frame */
     uint64_t drawn[FOREST_OBJECTS]; /* surfels read of each object in the last frame */
+    double away;                    /* share of its surfels in bricks that face away */
 } measured;
 
 typedef struct run {
@@ -181,6 +183,24 @@ static int draw(const run *r, int scene, bool selects, const trip_camera *camera
     return status;
 }
 
+/* Finds the share of surfels that front sides alone would leave out by bricks. */
+static int find_away(const run *r, int scene, const trip_camera *camera, double *share)
+{
+    const trip_clip none = { .count = 0 };
+    trip_surfel_plan plan;
+    const int status =
+        trip_surfel_plan_make(&plan, &(trip_surfel_plan_params){ .sets = r->placed,
+                                                                 .set_count = scenes[scene].objects,
+                                                                 .camera = camera,
+                                                                 .clip = &none,
+                                                                 .lod_px = 1,
+                                                                 .front = true,
+                                                                 .budget = r->budget });
+    *share = (double)plan.away_records / (double)(plan.records + plan.away_records);
+    trip_surfel_plan_drop(&plan, r->budget);
+    return status;
+}
+
 /* Draws an untimed frame, then timed ones, with and without selection in turns. */
 static int measure_scene(const run *r, int scene, measured to[MODES])
 {
@@ -194,6 +214,8 @@ static int measure_scene(const run *r, int scene, measured to[MODES])
             measure_progress_step(r->o->progress, scenes[scene].name);
             status = draw(r, scene, selects, &camera, &history, &to[selects], frame);
         }
+        if (!status)
+            status = find_away(r, scene, &camera, &to[1].away);
     }
     trip_surfel_history_drop(&history, r->budget);
     return status;
@@ -225,7 +247,7 @@ static void add_selection(const run *r, int scene, measured to[MODES], cJSON *ro
     cJSON_AddStringToObject(row, "scene", scenes[scene].name);
     measure_add(row, { "objects", scenes[scene].objects }, { "in_view", s->objects },
                 { "surfels", (double)s->planned },
-                { "culled", 1 - (double)s->visible / (double)s->planned },
+                { "culled", 1 - (double)s->visible / (double)s->planned }, { "away", to[1].away },
                 { "without_fps", 1e3 / without }, { "fps", 1e3 / with },
                 { "speedup", without / with }, { "named", named_share(&to[1]) },
                 { "paper_culled", scenes[scene].paper_culled },
@@ -270,6 +292,8 @@ static void describe(const run *r, bench_report *report)
     bench_report_limit(report, "The passes are those of the last frame. Keys have 32 bits of depth "
                                "and 32 of number. Identifiers of 32 bits, 12 for the object and 20 "
                                "for its surfel, name the share of surfels in the table.");
+    bench_report_limit(report, "Bricks facing away are those that --sides front does not read in "
+                               "the last frame; here both sides are drawn.");
 }
 
 static int measure_all(const run *r, bench_report *report)

@@ -188,6 +188,7 @@ static void add_surfels(cJSON *frame, const triptych_frame_stats *s)
     cJSON *o = cJSON_AddObjectToObject(frame, "surfels");
     cJSON_AddNumberToObject(o, "objects_in_view", s->objects_in_view);
     cJSON_AddNumberToObject(o, "planned", (double)s->surfels_planned);
+    cJSON_AddNumberToObject(o, "away", (double)s->surfels_away);
     cJSON_AddNumberToObject(o, "unread", (double)s->surfels_unread);
     cJSON_AddNumberToObject(o, "read", (double)s->splats);
     cJSON_AddNumberToObject(o, "outside", (double)s->surfels_outside);
@@ -447,10 +448,11 @@ int render_stats_explain_cost(const render_options *o, triptych *t, FILE *out)
         fprintf(out, "objects     %u more, which --stats lists\n", objects - OBJECTS_PRINTED);
     if (frame.order == TRIPTYCH_ORDER_DEFERRED)
         fprintf(out,
-                "surfels     %" PRIu64 " in view, %" PRIu64 " in hidden bricks not read, %" PRIu64
-                " outside, %" PRIu64 " hidden, %" PRIu64 " visible\n",
-                frame.surfels_planned, frame.surfels_unread, frame.surfels_outside,
-                frame.surfels_hidden, frame.surfels_visible);
+                "surfels     %" PRIu64 " in view, %" PRIu64
+                " in bricks facing away not read, %" PRIu64 " in hidden bricks not read, %" PRIu64
+                " outside or facing away, %" PRIu64 " hidden, %" PRIu64 " visible\n",
+                frame.surfels_planned, frame.surfels_away, frame.surfels_unread,
+                frame.surfels_outside, frame.surfels_hidden, frame.surfels_visible);
     if (frame.bytes_cached)
         fprintf(out, "cache       %s from memory\n", trip_format_bytes(frame.bytes_cached, bytes));
     if (frame.bytes_occluded)

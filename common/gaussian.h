@@ -6,6 +6,8 @@
 
 #include <stdint.h>
 
+#include "geometry.h"
+
 enum { TRIP_SH_DEGREE_MAX = 3, TRIP_SH_MAX = 16 };
 
 typedef struct trip_gaussian {
@@ -13,6 +15,9 @@ typedef struct trip_gaussian {
     float deviations[3]; /* standard deviations along the principal axes, in units of the scene */
     float rotation[4];   /* w, x, y, z; unit length; from the principal axes to the scene */
     float opacity;       /* 0 to 1 */
+    uint16_t merged;     /* 1: of a coarse level, where it stands for Gaussians of the scene */
+    /* 1: a coarse surfel that stands for surfels of several sides, so it has no front side */
+    uint16_t two_sided;
     /* Spherical harmonics of the display colour: coefficient, then channel. The colour is 0.5 plus
      * their sum (gaussian_colour.h). Coefficients beyond the scene's degree are 0. */
     float sh[TRIP_SH_MAX][3];
@@ -22,13 +27,37 @@ typedef struct trip_gaussian {
      * (gaussian_picture.h). */
     uint8_t from_camera;
     uint8_t hyperline; /* 1: the coefficients hold colours from several cameras (hyperline.h) */
-    uint32_t merged;   /* 1: of a coarse level, where it stands for Gaussians of the scene */
 } trip_gaussian;
 
 /* Returns the number of coefficients up to a degree: 1, 4, 9 or 16. */
 static inline int trip_sh_count(int degree)
 {
     return (degree + 1) * (degree + 1);
+}
+
+/* Returns the principal axis with the least deviation: the normal of a surfel. */
+static inline int trip_surfel_axis(const trip_gaussian *g)
+{
+    int least = 2;
+    for (int i = 0; i < 2; i++)
+        least = g->deviations[i] < g->deviations[least] ? i : least;
+    return least;
+}
+
+/* Returns a principal axis in scene space. */
+static inline trip_vec3 trip_surfel_principal(const trip_gaussian *g, int axis)
+{
+    const double w = (double)g->rotation[0], x = (double)g->rotation[1];
+    const double y = (double)g->rotation[2], z = (double)g->rotation[3];
+    return axis == 0   ? trip_v3(1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y))
+           : axis == 1 ? trip_v3(2 * (x * y - w * z), 1 - 2 * (x * x + z * z), 2 * (y * z + w * x))
+                       : trip_v3(2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y));
+}
+
+/* Returns the normal of a surfel, which points away from its front side. */
+static inline trip_vec3 trip_surfel_normal(const trip_gaussian *g)
+{
+    return trip_surfel_principal(g, trip_surfel_axis(g));
 }
 
 /* The harmonic of degree 0: 1 / (2 sqrt(pi)). */

@@ -289,6 +289,7 @@ static const char *const targets[] = { "rgba32f", "rgba16f", "rgba8", NULL };
 static const char *const traversals[] = { "outward", "ascending", NULL };
 static const char *const weights[] = { "pixel", "vertex", NULL };
 static const char *const orders[] = { "depth", "lists", "sheets", "deferred", NULL };
+static const char *const sides[] = { "both", "front", NULL };
 static const char *const degrees[] = { "0", "1", "2", "3", NULL };
 
 #define CHOICE(names) .type = TRIP_OPTION_CHOICE, .choices = (names), .first = 1
@@ -513,6 +514,14 @@ static const trip_option rows[DRAW_OPTIONS] = {
                          "Reads spherical harmonics up to this degree: 0, 1, 2 or 3",
                          "all of the scene", "Gaussian scenes only", .group = DRAW_GROUP_ACCURACY,
                          .measured = true, AT(scene.harmonics), CHOICE(degrees) },
+    [DRAW_SIDES] = { "sides", "both|front",
+                     "Draws the surfels of a cloud from both sides, or from the front alone: the "
+                     "side of their normals. Backs are then invisible, and bricks of backs are not "
+                     "read",
+                     "both", "clouds of points with --order deferred only",
+                     .brief = "Draws both sides of surfels, or the front alone",
+                     .group = DRAW_GROUP_ACCURACY, .measured = true, AT(scene.sides),
+                     CHOICE(sides) },
 };
 
 const trip_option_table draw_settings_table = { rows, DRAW_OPTIONS };

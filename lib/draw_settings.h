@@ -97,6 +97,7 @@ enum {
     DRAW_ORDER,
     DRAW_SHEET,
     DRAW_HARMONICS, /* named "sh" */
+    DRAW_SIDES,
     DRAW_OPTIONS
 };
 

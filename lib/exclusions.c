@@ -97,6 +97,8 @@ static const struct rule {
       0, 0, "does not apply to --renderer integral, which has no layers", IDLE },
     { ROW(ORDER) | ROW(SHEET), RENDERER(INTEGRAL), 0, 0,
       "does not apply to --renderer integral, which has no order", IDLE },
+    { ROW(SIDES), RENDERER(GL) | RENDERER(INTEGRAL), 0, 0,
+      "requires --order deferred, so --renderer cpu or reference", CONFLICT },
     { ROW(ORDER), RENDERER(GL), BY_SHEETS, 0, "sheets requires --renderer cpu or reference",
       CONFLICT },
     { ROW(FOOTPRINT) | ROW(EARLY_TERMINATION), ALL, DEFERRED, 0,
@@ -341,7 +343,7 @@ static const uint64_t of_both = ROW(BACKGROUND) | ROW(CLIP_BOX) | ROW(CLIP_PLANE
                                 ROW(DEPTH) | ROW(NORMALISE) | ROW(METHOD) | ROW(H) | ROW(LOD) |
                                 ROW(TOLERANCE) | ROW(EFFECTS) | ROW(SHOW);
 
-static const uint64_t of_clouds = ROW(LIGHT) | ROW(NO_SHADING);
+static const uint64_t of_clouds = ROW(LIGHT) | ROW(NO_SHADING) | ROW(SIDES);
 
 static const uint64_t not_of_objects = ROW(SHEET) | ROW(LOD) | ROW(MAX_BYTES) | ROW(MAX_MS) |
                                        ROW(SHOW) | ROW(COUNT) | ROW(TEMPERATURE) |
@@ -374,13 +376,21 @@ static bool has_one_layer(const draw_settings *s)
     return s->scene.order <= TRIPTYCH_ORDER_DEPTH || s->scene.order == TRIPTYCH_ORDER_DEFERRED;
 }
 
+/* The default order of clouds is deferred, too. */
+static bool has_sides(const draw_settings *s, int kind)
+{
+    return kind == DRAW_KIND_CLOUD &&
+           (s->scene.order == TRIPTYCH_ORDER_DEFAULT || s->scene.order == TRIPTYCH_ORDER_DEFERRED);
+}
+
 static uint64_t rows_of_kind(const draw_settings *s, int kind)
 {
     const uint64_t merging = ROW(METHOD) | ROW(H) | ROW(SHOW);
     const uint64_t own = of_scenes | of_both | (kind == DRAW_KIND_CLOUD ? of_clouds : 0);
+    const uint64_t others = has_sides(s, kind) ? 0 : ROW(SIDES);
     if (kind == DRAW_KIND_OBJECTS) /* the finest level can be asked for */
-        return ~not_of_objects | (s->lod.voxel_px == TRIPTYCH_ZERO ? ROW(LOD) : 0);
-    return kind ? own & (has_one_layer(s) ? ~merging : ~0ULL) : ~of_scenes;
+        return (~not_of_objects & ~others) | (s->lod.voxel_px == TRIPTYCH_ZERO ? ROW(LOD) : 0);
+    return (kind ? own & (has_one_layer(s) ? ~merging : ~0ULL) : ~of_scenes) & ~others;
 }
 
 int draw_settings_effects_of_kind(int kind)
@@ -442,6 +452,10 @@ int draw_settings_check_kind(const draw_settings *s, const triptych_resources *r
         [DRAW_KIND_OBJECTS] = { .given = ~rows_of_kind(s, DRAW_KIND_OBJECTS),
                                 .why = NOT_OF_OBJECTS },
     };
+    const struct rule of_sides = { .given = has_sides(s, kind) ? 0 : ROW(SIDES),
+                                   .why = kind == DRAW_KIND_CLOUD
+                                              ? "requires --order deferred"
+                                              : "applies to clouds of points only" };
     static const char *const wrong_effects[] = {
         [DRAW_KIND_VOLUME] = "edl applies to Gaussian scenes and clouds of points only",
         [DRAW_KIND_SCENE] =
@@ -458,6 +472,8 @@ int draw_settings_check_kind(const draw_settings *s, const triptych_resources *r
         .why =
             "does not apply to scenes with --order depth or deferred, which have nothing to merge",
     };
+    if (of_sides.given & given)
+        return fail_rule(&of_sides, given);
     if (of_kinds[kind].given & given)
         return fail_rule(&of_kinds[kind], given);
     if (s->effects.which & ~draw_settings_effects_of_kind(kind))

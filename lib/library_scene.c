@@ -269,11 +269,16 @@ trip_view_object trip_context_scene_object(const triptych *t)
 /* Gaussians wider than a pixel are drawn as they are. */
 #define DEFAULT_LOD_PX 1.0
 
-/* Returns whether settings are given that only blending has. */
+static bool has_front_sides(const triptych *t)
+{
+    return t->given.scene.sides == TRIPTYCH_SIDES_FRONT;
+}
+
+/* Returns whether settings are given that only blending has. Front sides only exist without. */
 static bool blends(const triptych *t)
 {
     return t->given.splat.footprint || t->given.all.early_termination != 0 ||
-           (t->scene_opacity > 0 && t->scene_opacity != 1);
+           (t->scene_opacity > 0 && t->scene_opacity != 1 && !has_front_sides(t));
 }
 
 /* Returns whether all objects are surfels, not ellipsoids. */
@@ -347,6 +352,8 @@ static int check(const triptych *t)
     const int status = draw_settings_check_kind(&t->given, &t->resources, kind_of(t));
     if (!status && t->given.scene.order == TRIPTYCH_ORDER_DEFERRED && !is_flat(t))
         return trip_option_fail("--order", "deferred requires clouds of surfels, not ellipsoids");
+    if (!status && has_front_sides(t) && order_of(t) != TRIPTYCH_ORDER_DEFERRED)
+        return trip_option_fail("--sides", "front requires --order deferred");
     return status ? status : check_sheets(t);
 }
 
@@ -390,6 +397,7 @@ static trip_gaussian_settings settings_of(const triptych *t)
         .clip = trip_context_clip(t),
         .light = t->lit ? &t->drawn_settings : NULL,
         .depth = g->all.depth || t->mixed || t->levels,
+        .front = has_front_sides(t),
     };
     for (unsigned i = 0; i < t->placed_count; i++)
         out.antialiased &= (t->placed[i].set->header.flags & TRIP_GAUSSIAN_ANTIALIASED) != 0;
@@ -571,6 +579,7 @@ static triptych_frame_stats stats_of(const triptych *t)
         .effects = t->levels ? TRIPTYCH_EFFECT_EDL : 0,
         .order = order_of(t),
         .surfels_planned = s.surfels.planned,
+        .surfels_away = s.surfels.away,
         .surfels_unread = s.surfels.unread,
         .surfels_outside = s.surfels.outside,
         .surfels_hidden = s.surfels.hidden,
@@ -687,7 +696,8 @@ void trip_context_explain_scene(const triptych *t, FILE *out)
     else
         fprintf(out, "levels      the Gaussians of the scene alone\n");
     if (order_of(t) == TRIPTYCH_ORDER_DEFERRED) {
-        fprintf(out, "footprint   discs, with a filter of 0.48 square pixels (EWA)\n");
+        fprintf(out, "footprint   discs%s, with a filter of 0.48 square pixels (EWA)\n",
+                has_front_sides(t) ? " seen from their front sides" : "");
         return;
     }
     fprintf(out, "footprint   %s%s\n",

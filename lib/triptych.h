@@ -645,6 +645,15 @@ typedef enum triptych_order {
     TRIPTYCH_ORDER_DEFERRED,
 } triptych_order;
 
+/* The sides of surfels that are drawn. */
+typedef enum triptych_sides {
+    TRIPTYCH_SIDES_DEFAULT, /* both */
+    TRIPTYCH_SIDES_BOTH,
+    /* The front sides alone, from which normals point away. A coarse surfel that stands for several
+     * sides has no front side, and is drawn. For the deferred order. */
+    TRIPTYCH_SIDES_FRONT,
+} triptych_sides;
+
 /* The highest degree of the spherical harmonics of a scene that are read and drawn. */
 typedef enum triptych_harmonics {
     TRIPTYCH_HARMONICS_DEFAULT, /* all that the scene has */
@@ -661,6 +670,7 @@ typedef struct triptych_scene_settings {
     /* Thickness of a sheet in units of the scene; for the order by sheets. The default is a 1024th
      * of the scene's radius, half the diagonal of its typical bounds. */
     double sheet;
+    triptych_sides sides; /* of clouds of points */
 } triptych_scene_settings;
 
 /* The settings of a picture. NULL selects the defaults of a group. */
@@ -878,9 +888,11 @@ typedef struct triptych_frame_stats {
     unsigned trials;      /* made by this context */
     int choice_waits;     /* 1 if the frame has the defaults until triptych_choose() */
     triptych_order order; /* of Gaussians, as drawn; TRIPTYCH_ORDER_DEFAULT for volumes */
-    /* Deferred pictures count the surfels of the bricks in view. Unread ones are in hidden bricks.
-     * The others were read. They lie outside the picture, or are hidden, or are visible. */
-    uint64_t surfels_planned, surfels_unread, surfels_outside, surfels_hidden, surfels_visible;
+    /* Deferred pictures count the surfels of the bricks in view. With front sides alone, some
+     * bricks face away and are not read. Unread surfels are in hidden bricks. The others were read.
+     * They lie outside the picture or face away, or are hidden, or are visible. */
+    uint64_t surfels_planned, surfels_away, surfels_unread, surfels_outside, surfels_hidden,
+        surfels_visible;
     unsigned objects_in_view;
 } triptych_frame_stats;
 

@@ -10,6 +10,7 @@ const trip_scene_choice trip_scene_choices[TRIP_SCENE_CHOICES] = {
     { DRAW_ORDER, "Order", NULL },
     { DRAW_FOOTPRINT, "Footprint", "as trained" },
     { DRAW_HARMONICS, "Harmonics", "all degrees" },
+    { DRAW_SIDES, "Sides", NULL },
 };
 
 static void add(trip_scene_entry *e, const char *label, const char *value)
@@ -25,8 +26,10 @@ static bool has_gaussians(const triptych_scene *scene)
 }
 
 /* Returns whether the scene has a choice. Degrees above the scene's own add nothing. */
-static bool has_choice(int row, int choice, const triptych_scene *scene)
+static bool has_choice(int row, int choice, const triptych_scene *scene, const draw_settings *s)
 {
+    if (row == DRAW_SIDES && !(scene->clouds && draw_settings_applies(s, row, DRAW_KIND_CLOUD)))
+        return false;
     if (scene->volumes && !draw_settings_choice_applies(row, choice, DRAW_KIND_OBJECTS))
         return false;
     if (row == DRAW_ORDER && choice == TRIPTYCH_ORDER_SHEETS - 1 && scene->moved)
@@ -54,7 +57,7 @@ int trip_scene_entries(const trip_scene_choice *choice, const triptych_scene *sc
     if (choice->standard)
         add(&entries[count++], choice->standard, "");
     for (int i = 0; row->choices[i] && count < TRIP_SCENE_ENTRIES; i++) {
-        if (!has_choice(choice->row, i, scene))
+        if (!has_choice(choice->row, i, scene, s))
             continue;
         if (i == value || (value < 0 && !choice->standard &&
                            !strcmp(row->choices[i], standard_of(row, choice->row, scene))))

@@ -18,7 +18,7 @@ typedef struct trip_scene_choice {
     const char *standard; /* name of the default, if no value of the row is the default; or NULL */
 } trip_scene_choice;
 
-enum { TRIP_SCENE_CHOICES = 3, TRIP_SCENE_ENTRIES = 16 };
+enum { TRIP_SCENE_CHOICES = 4, TRIP_SCENE_ENTRIES = 16 };
 
 extern const trip_scene_choice trip_scene_choices[TRIP_SCENE_CHOICES];
 

@@ -89,6 +89,11 @@ void trip_gaussian_moments_of(const trip_gaussian *g, int degree, trip_gaussian_
     covariance_of(g, out->spread);
     for (int i = 0; i < 6; i++)
         out->spread[i] *= out->mass;
+    if (g->deviations[2] == 0) {
+        const trip_vec3 n = trip_surfel_principal(g, 2);
+        for (int c = 0; c < 3; c++)
+            out->normal[c] = out->mass * trip_component(n, c);
+    }
     for (int k = 0; k < trip_sh_count(degree); k++)
         for (int c = 0; c < 3; c++)
             out->colours[k][c] = out->mass * (double)g->sh[k][c];
@@ -108,6 +113,7 @@ void trip_gaussian_moments_add(trip_gaussian_moments *to, const trip_gaussian_mo
     for (int a = 0; a < 3; a++) {
         apart[a] = from->centre[a] - to->centre[a];
         to->centre[a] += apart[a] * (from->mass / mass);
+        to->normal[a] += from->normal[a];
     }
     for (int i = 0, at = 0; i < 3; i++)
         for (int j = i; j < 3; j++, at++)
@@ -196,6 +202,25 @@ static double opacity_of(double depth)
     return fmax(o, 0);
 }
 
+/* Turns a surfel by half a turn, so that the other side becomes its front side. */
+static void turn_over(trip_gaussian *g, int normal)
+{
+    const float w = g->rotation[0], x = g->rotation[1], y = g->rotation[2], z = g->rotation[3];
+    const float about_x[4] = { -x, w, z, -y }, about_y[4] = { -y, -z, w, x };
+    memcpy(g->rotation, normal == 0 ? about_y : about_x, sizeof g->rotation);
+}
+
+/* Chooses the front side of a merged surfel. */
+static void set_side(const trip_gaussian_moments *m, trip_gaussian *g)
+{
+    const int axis = trip_surfel_axis(g);
+    const double along =
+        trip_dot(trip_surfel_principal(g, axis), trip_v3(m->normal[0], m->normal[1], m->normal[2]));
+    g->two_sided = fabs(along) < TRIP_MERGED_SIDE * m->mass;
+    if (along < 0)
+        turn_over(g, axis);
+}
+
 trip_gaussian trip_gaussian_moments_merge(const trip_gaussian_moments *m, int degree)
 {
     trip_gaussian g = { .opacity = 0 };
@@ -210,6 +235,7 @@ trip_gaussian trip_gaussian_moments_merge(const trip_gaussian_moments *m, int de
     g.opacity = (float)(depth > most ? ALPHA_MAX : opacity_of(depth));
     for (int k = 0; k < 3; k++)
         g.deviations[k] = (float)(deviations[k] * grow);
+    set_side(m, &g);
     for (int k = 0; k < trip_sh_count(degree); k++)
         for (int c = 0; c < 3; c++)
             g.sh[k][c] = (float)(m->colours[k][c] / m->mass);

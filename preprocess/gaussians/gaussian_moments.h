@@ -12,6 +12,11 @@
  * covariance is the mean covariance plus the covariance of the centres. Moments of moments are the
  * moments of all.
  *
+ * Side. The normal of a merged surfel is its axis with the least deviation, on the side of the mean
+ * normal. Means are weighted by m. If the mean cosine between normals and axis is below
+ * TRIP_MERGED_SIDE, the surfels have several sides, as in a thin wall. The merged surfel
+ * then has no front side: it has two sides.
+ *
  * Opacity. Optical depths add up where Gaussians overlap. The integral of the optical depth over
  * the picture is:
  *
@@ -32,12 +37,14 @@
 #include "gaussian.h"
 
 #define TRIP_MERGED_DEPTH_MAX 1.5
+#define TRIP_MERGED_SIDE 0.5
 
 typedef struct trip_gaussian_moments {
     uint64_t count;
     double mass, optical;           /* sums of m and t */
     double centre[3];               /* mean */
     double spread[6];               /* sum of m times covariance: xx, xy, xz, yy, yz, zz */
+    double normal[3];               /* sum of m times the normals of surfels */
     double colours[TRIP_SH_MAX][3]; /* sums of m times coefficient */
 } trip_gaussian_moments;
 

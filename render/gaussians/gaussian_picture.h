@@ -93,6 +93,7 @@ typedef struct trip_gaussian_settings {
     double background[4];       /* r, g, b, a; not premultiplied */
     const trip_settings *light; /* on surfels (surfel_light.h); NULL: none */
     bool depth;                 /* also computes distances */
+    bool front; /* surfels with a front side are drawn from there alone (deferred) */
 } trip_gaussian_settings;
 
 static inline double trip_gaussian_termination(const trip_gaussian_settings *s)

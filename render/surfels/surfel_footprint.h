@@ -28,25 +28,6 @@ static inline trip_vec3 trip_surfel_deviations(const trip_gaussian *g)
     return trip_scale(trip_gaussian_deviations(g), g->merged ? TRIP_SURFEL_MERGED : 1);
 }
 
-/* Returns the principal axis with the least deviation: the normal of the disc. */
-static inline int trip_surfel_axis(const trip_gaussian *g)
-{
-    int least = 2;
-    for (int i = 0; i < 2; i++)
-        least = g->deviations[i] < g->deviations[least] ? i : least;
-    return least;
-}
-
-/* Returns a principal axis in scene space. */
-static inline trip_vec3 trip_surfel_principal(const trip_gaussian *g, int axis)
-{
-    const double w = (double)g->rotation[0], x = (double)g->rotation[1];
-    const double y = (double)g->rotation[2], z = (double)g->rotation[3];
-    return axis == 0   ? trip_v3(1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y))
-           : axis == 1 ? trip_v3(2 * (x * y - w * z), 1 - 2 * (x * x + z * z), 2 * (y * z + w * x))
-                       : trip_v3(2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y));
-}
-
 /* Returns half the extent of the disc in depth. */
 static inline double trip_surfel_extent(const trip_camera *c, const trip_gaussian *g, int normal,
                                         trip_vec3 deviations)
@@ -134,6 +115,13 @@ static inline double trip_surfel_depth(const trip_surfel_footprint *f, bool orth
     return fmax(f->near, fmin(f->far, z));
 }
 
+/* Returns whether a surfel shows its back. */
+static inline bool trip_surfel_faces_away(const trip_camera *c, const trip_gaussian *g,
+                                          trip_vec3 from_eye)
+{
+    return !g->two_sided && trip_dot(trip_surfel_normal(g), c->ortho ? c->r0 : from_eye) > 0;
+}
+
 /* Computes the footprint of a surfel. Returns false if the surfel is not drawn. */
 static inline bool trip_surfel_footprint_of(const trip_camera *c, const trip_gaussian_settings *s,
                                             const trip_gaussian *g, trip_surfel_footprint *f)
@@ -149,6 +137,8 @@ static inline bool trip_surfel_footprint_of(const trip_camera *c, const trip_gau
     for (int i = 0; i < s->clip.count; i++)
         if (!(trip_dot(s->clip.planes[i].normal, centre) + s->clip.planes[i].offset >= 0))
             return false;
+    if (s->front && trip_surfel_faces_away(c, g, from_eye))
+        return false;
     const double by = c->ortho ? 1 : f->z;
     f->x = trip_dot(c->to_x, from_eye) / by;
     f->y = trip_dot(c->to_y, from_eye) / by;

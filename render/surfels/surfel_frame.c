@@ -96,16 +96,18 @@ static int begin_picture(trip_surfel_frame *f)
 static int make_plan(trip_surfel_frame *f)
 {
     const trip_surfel_frame_params *p = &f->params;
-    const int status =
-        trip_surfel_plan_make(&f->plan, &(trip_surfel_plan_params){ .sets = p->sets,
-                                                                    .set_count = p->set_count,
-                                                                    .camera = p->camera,
-                                                                    .clip = &p->settings.clip,
-                                                                    .lod_px = p->lod_px,
-                                                                    .history = p->history,
-                                                                    .budget = p->budget });
+    const int status = trip_surfel_plan_make(
+        &f->plan, &(trip_surfel_plan_params){ .sets = p->sets,
+                                              .set_count = p->set_count,
+                                              .camera = p->camera,
+                                              .clip = &p->settings.clip,
+                                              .lod_px = p->lod_px,
+                                              .front = p->settings.front && !p->reference,
+                                              .history = p->history,
+                                              .budget = p->budget });
     f->stats.objects = f->plan.objects;
-    f->stats.planned = f->plan.records;
+    f->stats.planned = f->plan.records + f->plan.away_records;
+    f->stats.away = f->plan.away_records;
     f->stats.coarse = f->plan.coarse_records;
     return status;
 }
@@ -296,7 +298,8 @@ static int draw_batch(trip_surfel_frame *f)
                                : trip_surfels_cpu_add_from(f->cpu, get_surfel, f, count);
     *(f->blending ? &f->stats.blend_ms : &f->stats.project_ms) += trip_now_ms() - begun;
     const double planned = (double)f->stats.planned;
-    f->stats.done = planned > 0 ? (double)(f->stats.read + f->stats.unread) / planned : 1;
+    f->stats.done =
+        planned > 0 ? (double)(f->stats.read + f->stats.unread + f->stats.away) / planned : 1;
     return status;
 }
 

@@ -36,8 +36,9 @@ typedef struct trip_surfel_frame_stats {
     uint64_t planned; /* surfels of bricks in view */
     uint64_t coarse;  /* of these */
     uint64_t read;
+    uint64_t away;    /* planned, and facing away as bricks */
     uint64_t unread;  /* planned, and hidden as bricks */
-    uint64_t outside; /* read, and outside the picture */
+    uint64_t outside; /* read, and outside the picture, or facing away */
     uint64_t hidden;  /* read, and hidden */
     uint64_t visible; /* in the last picture */
     uint64_t bricks, bytes_read;

@@ -33,6 +33,10 @@
  * In perspective, a surfel is drawn if z > r; in parallel views, if z > 0. Its centre must lie
  * inside the clip, and the bounds of its ellipse q <= TRIP_SURFEL_REACH must meet the picture.
  *
+ * With trip_gaussian_settings.front, a surfel that faces away is not drawn. Let n be its normal and
+ * v the direction of the ray through its centre. It faces away if n . v > 0, and if it has a front
+ * side (trip_gaussian.two_sided).
+ *
  * Passes
  * ------
  * 1. Visibility: D(p) is the least z(p) of all drawn surfels that cover the centre of pixel p. It
@@ -54,6 +58,9 @@
  * An opacity_scale below 1 gives the whole cloud the opacity 1 - 0.01^opacity_scale, since surfels
  * have an opacity of 0.99. The background comes behind all. The depth picture (layer.h) has D(p),
  * and infinity where nothing is drawn.
+ *
+ * Limits: the sides of a wall thinner than t blend, unless front sides alone are drawn. A plane
+ * that is steeper than TRIP_SURFEL_STEEP may have gaps.
  *
  * Surfels behind D + t at all pixels that they may reach change nothing. So renderers may leave out
  * any that are behind the D known so far: no bit of the picture depends on it. */

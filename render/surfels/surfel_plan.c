@@ -207,6 +207,45 @@ bool trip_surfel_plan_bounds(const trip_surfel_plan *plan, const trip_camera *c,
     return *depth > 0;
 }
 
+/* ---- sides ---- */
+
+/* Turns a vector by a quaternion. */
+static trip_vec3 turned_by(const double q[4], trip_vec3 v)
+{
+    const trip_vec3 u = trip_v3(q[1], q[2], q[3]);
+    const trip_vec3 t = trip_scale(trip_cross(u, v), 2);
+    return trip_add(v, trip_add(trip_scale(t, q[0]), trip_cross(u, t)));
+}
+
+/* Returns whether all surfels of a brick face away, in spite of rounding. */
+static bool faces_away(const trip_camera *c, const trip_gaussian_transform *t,
+                       const trip_file_gaussian_brick *b)
+{
+    trip_vec3 axis =
+        trip_v3((double)b->cone_axis[0], (double)b->cone_axis[1], (double)b->cone_axis[2]);
+    const double cosine = (double)b->cone_cosine;
+    double sine = sqrt(1 - cosine * cosine) + 1e-5;
+    if (!(cosine > 0))
+        return false;
+    axis = trip_normalize(axis);
+    if (!t->identity) {
+        const double *q = t->rotation;
+        const double square = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
+        axis = turned_by(q, axis);
+        sine += 4 * fabs(1 - square); /* normals turn by a quaternion that may not be quite unit */
+    }
+    if (c->ortho)
+        return trip_dot(axis, c->r0) > sine * trip_length(c->r0);
+    bool away = true;
+    for (int i = 0; i < 8 && away; i++) {
+        const trip_vec3 corner = corner_of(t, b->centre_lo, b->centre_hi, i);
+        const trip_vec3 from_eye = trip_sub(corner, c->eye);
+        const double rounding = 1e-12 * (trip_length(corner) + trip_length(c->eye));
+        away = trip_dot(axis, from_eye) > sine * trip_length(from_eye) + rounding;
+    }
+    return away;
+}
+
 /* ---- the plan ---- */
 
 /* Returns how many bricks the levels of a set have. */
@@ -231,6 +270,11 @@ static void add_node(trip_surfel_plan *plan, trip_key *keys, const trip_surfel_p
             plan->outside_records += from->records;
             continue;
         }
+        plan->coarse_records += n->nodes > 1 ? from->records : 0;
+        if (p->front && faces_away(p->camera, &v->set->placement, from)) {
+            plan->away_records += from->records;
+            continue;
+        }
         trip_surfel_brick *b = &plan->bricks[plan->count];
         *b = (trip_surfel_brick){ .brick = i,
                                   .object = (uint32_t)(v->set - p->sets),
@@ -246,7 +290,6 @@ static void add_node(trip_surfel_plan *plan, trip_key *keys, const trip_surfel_p
         keys[plan->count] = (trip_key){ key, plan->count };
         plan->count++;
         plan->records += from->records;
-        plan->coarse_records += n->nodes > 1 ? from->records : 0;
     }
 }
 

@@ -1,6 +1,11 @@
 /* The bricks that a deferred picture may read, in the order of reading. They belong to the level of
  * detail and meet the view. The order changes no bit of the picture (surfel_picture.h), but
- * bricks read early may hide later ones. */
+ * bricks read early may hide later ones.
+ *
+ * With front sides alone, bricks that face away are left out. The normals of a brick lie in a cone
+ * with the axis a and the half angle alpha, and its centres p in a box. Let v = p - eye, or the
+ * direction of parallel rays. All surfels face away if a . v > sin(alpha) |v| for all p. The left
+ * side minus the right one is a concave function of p. So it suffices to test the corners. */
 #ifndef TRIP_SURFEL_PLAN_H
 #define TRIP_SURFEL_PLAN_H
 
@@ -33,7 +38,9 @@ typedef struct trip_surfel_plan {
     trip_surfel_brick *bricks; /* by ascending numbers */
     trip_key *order;           /* `number` is an index of bricks; in the order of reading */
     size_t count;
-    uint64_t records, coarse_records;
+    uint64_t records;
+    uint64_t away_records;    /* of bricks in view that face away */
+    uint64_t coarse_records;  /* of both */
     uint64_t outside_records; /* of bricks that do not meet the view, of sets that do */
     unsigned objects;         /* sets that meet the view */
     void *memory;
@@ -46,6 +53,7 @@ typedef struct trip_surfel_plan_params {
     const trip_camera *camera;
     const trip_clip *clip;
     double lod_px;                      /* as in trip_gaussian_lod */
+    bool front;                         /* leaves out bricks that face away */
     const trip_surfel_history *history; /* NULL: none */
     trip_budget *budget;
 } trip_surfel_plan_params;

@@ -34,7 +34,8 @@ typedef struct trip_surfels_cpu_params {
 
 typedef struct trip_surfels_cpu_stats {
     uint64_t added;
-    uint64_t outside; /* added, but not drawn: they do not meet the picture or the clip */
+    /* Added, but not drawn: they do not meet the picture or the clip, or face away. */
+    uint64_t outside;
     uint64_t hidden;  /* skipped behind earlier batches */
     uint64_t visible; /* selected and visible in the last picture */
     uint64_t project_ns, blend_ns;

@@ -132,6 +132,18 @@ static bool is_range(float lo, float hi)
     return isfinite(lo) && isfinite(hi) && lo <= hi;
 }
 
+/* Whether a brick has a cone of normals, or four zeros for none. */
+static bool is_cone(const trip_file_gaussian_brick *b, const trip_file_gaussian_header *h)
+{
+    double length2 = 0;
+    for (int a = 0; a < 3; a++)
+        length2 += (double)b->cone_axis[a] * (double)b->cone_axis[a];
+    if (b->cone_cosine == 0)
+        return length2 == 0;
+    return trip_gaussian_has_sides(h) && fabs(length2 - 1) <= 1e-5 && b->cone_cosine > 0 &&
+           b->cone_cosine <= 1;
+}
+
 /* Returns why a brick is invalid, or NULL. */
 static const char *fault_of_brick(const trip_file_gaussian_brick *b,
                                   const trip_file_gaussian_header *h)
@@ -158,6 +170,8 @@ static const char *fault_of_brick(const trip_file_gaussian_brick *b,
     }
     if (!(b->opacity_max >= 0 && b->opacity_max <= 1))
         return "the largest opacity of a brick is outside 0 to 1";
+    if (!is_cone(b, h))
+        return "the cone of a brick's normals is invalid";
     for (unsigned n = trip_gaussian_plane_count(h, (int)h->degree); n < TRIP_GAUSSIAN_PLANES; n++)
         if (b->checksums[n])
             return "a brick has the checksum of a file that is absent";

@@ -25,6 +25,12 @@ enum {
 #define LOG_RANGE 14.0
 #define SQRT_HALF 0.70710678118654752440
 
+/* The cosine of a cone is less by this, since readers round normals in other ways. */
+#define CONE_MARGIN 1e-6
+/* Codes of deviations with such a range of logarithms differ by more than the rounding of floats.
+ */
+#define CODES_TELL 0.01
+
 typedef struct words {
     uint64_t w[3];
 } words;
@@ -312,6 +318,7 @@ static void decode_shape(const trip_file_gaussian_brick *b, words r, trip_gaussi
         before = code;
     }
     decode_rotation(r.w[1], out->rotation);
+    out->two_sided = (uint16_t)bits(r.w[0], 63, 1);
     out->opacity = (float)bits(r.w[1], 38, 12) / OPACITY_MAX;
 }
 
@@ -448,12 +455,75 @@ static void encode_chunk(trip_file_gaussian_brick *b, reach *to, const unsigned 
     b->opacity_max = opacity > b->opacity_max ? opacity : b->opacity_max;
 }
 
+/* Marks the records of surfels without a front side. */
+static void mark_sides(const unsigned char *const *splats, unsigned count, unsigned char *plane)
+{
+    for (unsigned i = 0; i < count; i++) {
+        unsigned char *record = plane + (size_t)i * TRIP_GAUSSIAN_RECORD_BYTES;
+        words r = load(record);
+        r.w[0] |= (uint64_t)((const trip_gaussian *)(const void *)splats[i])->two_sided << 63;
+        memcpy(record, &r, sizeof r);
+    }
+}
+
+/* Returns the decoded normal. Codes that are far enough apart tell the shortest axis by
+ * themselves. */
+static trip_vec3 normal_of(const trip_file_gaussian_brick *b, const unsigned char *record)
+{
+    const words r = load(record);
+    const bool told = (double)b->log_hi - (double)b->log_lo > CODES_TELL;
+    trip_gaussian g;
+    decode_rotation(r.w[1], g.rotation);
+    for (int a = 0; a < 3; a++) {
+        const unsigned code = (unsigned)bits(r.w[2], 12 * (unsigned)a, 12);
+        g.deviations[a] = told ? (float)code : decode_deviation(b, code);
+    }
+    return trip_surfel_normal(&g);
+}
+
+/* Returns the sum of the decoded normals, or 0 if a surfel has no front side. */
+static trip_vec3 sum_normals(const trip_file_gaussian_brick *b, const unsigned char *records,
+                             unsigned count)
+{
+    trip_vec3 sum = trip_v3(0, 0, 0);
+    for (unsigned i = 0; i < count; i++) {
+        const unsigned char *record = records + (size_t)i * TRIP_GAUSSIAN_RECORD_BYTES;
+        if (bits(load(record).w[0], 63, 1))
+            return trip_v3(0, 0, 0);
+        sum = trip_add(sum, normal_of(b, record));
+    }
+    return sum;
+}
+
+/* Sets the cone that holds the decoded normals. It has none if it would reach 90 degrees. */
+static void find_cone(trip_file_gaussian_brick *b, const unsigned char *records, unsigned count)
+{
+    const trip_vec3 sum = sum_normals(b, records, count);
+    double least = 1;
+    if (!(trip_length(sum) > 0))
+        return;
+    const trip_vec3 mean = trip_normalize(sum);
+    const float axis[3] = { (float)mean.x, (float)mean.y, (float)mean.z };
+    const trip_vec3 rounded =
+        trip_normalize(trip_v3((double)axis[0], (double)axis[1], (double)axis[2]));
+    for (unsigned i = 0; i < count && least > 0; i++)
+        least = fmin(least,
+                     trip_dot(rounded, trip_normalize(normal_of(
+                                           b, records + (size_t)i * TRIP_GAUSSIAN_RECORD_BYTES))));
+    const float cosine = nextafterf((float)(least - CONE_MARGIN), -1);
+    if (!(cosine > 0))
+        return;
+    memcpy(b->cone_axis, axis, sizeof axis);
+    b->cone_cosine = cosine;
+}
+
 void trip_gaussian_encode(trip_file_gaussian_brick *b, const trip_file_gaussian_header *h,
                           const unsigned char *const *splats, unsigned count,
                           unsigned char *const planes[])
 {
     const int degree = (int)h->degree, own = h->flags & TRIP_GAUSSIAN_PALETTE ? 0 : degree;
     const unsigned plane_count = trip_gaussian_plane_count(h, degree);
+    const bool has_sides = trip_gaussian_has_sides(h);
     reach bounds;
     find_ranges(b, splats, count, own);
     b->records = count;
@@ -463,6 +533,10 @@ void trip_gaussian_encode(trip_file_gaussian_brick *b, const trip_file_gaussian_
         encode_chunk(b, &bounds, splats + i, count - i < CHUNK ? count - i : CHUNK,
                      planes[0] + (size_t)i * TRIP_GAUSSIAN_RECORD_BYTES);
     end_reach(&bounds, b);
+    if (has_sides) {
+        mark_sides(splats, count, planes[0]);
+        find_cone(b, planes[0], count);
+    }
     for (unsigned i = 0; i < count && own > 0; i++)
         for (int n = 1; n <= own; n++)
             pack_harmonics(b->scale[n - 1], ((const trip_gaussian *)(const void *)splats[i])->sh, n,
@@ -495,14 +569,29 @@ void trip_gaussian_decode(const trip_file_gaussian_brick *b, const unsigned char
         harmonics = unpack_harmonics(b->scale[n - 1], harmonics, n, out->sh);
 }
 
-const char *trip_gaussian_record_fault(const unsigned char *record)
+/* Returns whether the cone of a brick holds the normal of a record. */
+static bool is_in_cone(const trip_file_gaussian_brick *b, const unsigned char *record)
+{
+    const trip_vec3 n = normal_of(b, record);
+    const trip_vec3 axis =
+        trip_v3((double)b->cone_axis[0], (double)b->cone_axis[1], (double)b->cone_axis[2]);
+    return trip_dot(n, axis) >=
+           ((double)b->cone_cosine - CONE_MARGIN) * trip_length(n) * trip_length(axis);
+}
+
+const char *trip_gaussian_record_fault(const trip_file_gaussian_brick *b,
+                                       const trip_file_gaussian_header *h,
+                                       const unsigned char *record)
 {
     const words r = load(record);
-    if (r.w[0] >> 63)
-        return "the reserved bit of a record is not zero";
+    const bool two_sided = r.w[0] >> 63;
+    if (two_sided && !trip_gaussian_has_sides(h))
+        return "a record without sides has the bit for two sides";
     for (unsigned at = 2; at < 38; at += 12)
         if (bits(r.w[1], at, 12) > ROTATION_MAX)
             return "the rotation of a record has an invalid code";
+    if (b->cone_cosine > 0 && (two_sided || !is_in_cone(b, record)))
+        return "the normal of a record is outside the cone of its brick";
     return NULL;
 }
 

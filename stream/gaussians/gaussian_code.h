@@ -33,8 +33,10 @@ void trip_gaussian_decode(const trip_file_gaussian_brick *b, const unsigned char
 /* Sets the half extents along X, Y and Z of an ellipsoid of TRIP_GAUSSIAN_REACH deviations. */
 void trip_gaussian_half_extents(const trip_gaussian *g, double half[3]);
 
-/* Returns why no writer makes such a record, or NULL. */
-const char *trip_gaussian_record_fault(const unsigned char *record);
+/* Returns why no writer makes such a record of the brick, or NULL. */
+const char *trip_gaussian_record_fault(const trip_file_gaussian_brick *b,
+                                       const trip_file_gaussian_header *h,
+                                       const unsigned char *record);
 /* Returns the code of the centre along an axis, 0 to 2097151. It ascends with the coordinate. */
 uint32_t trip_gaussian_centre_code(const unsigned char *record, int axis);
 

@@ -9,12 +9,13 @@
 #define TRIP_GAUSSIAN_FORMAT_H
 
 #include <assert.h>
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
 #include "format.h"
 
-#define TRIP_GAUSSIAN_VERSION 2
+#define TRIP_GAUSSIAN_VERSION 3
 #define TRIP_GAUSSIAN_HEADER_BYTES 512
 
 enum {
@@ -88,6 +89,9 @@ typedef struct trip_file_gaussian_brick {
     float scale[3];                   /* largest magnitude of the coefficients of degree 1 to 3 */
     float opacity_max;
     uint64_t checksums[TRIP_GAUSSIAN_PLANES]; /* XXH64 of the brick's bytes in each file */
+    /* The cone that holds the normals of all surfels: its axis of unit length, and the cosine of
+     * the angle from its axis to its side, above 0. All are 0 for no cone. */
+    float cone_axis[3], cone_cosine;
 } trip_file_gaussian_brick;
 
 static_assert(sizeof(trip_file_gaussian_header) == TRIP_GAUSSIAN_HEADER_BYTES, "header size");
@@ -97,9 +101,17 @@ static_assert(offsetof(trip_file_gaussian_header, reserved) == 304, "header layo
 static_assert(sizeof(trip_file_gaussian_node) == 104, "node size");
 static_assert(offsetof(trip_file_gaussian_node, first_brick) == 64, "node layout");
 static_assert(offsetof(trip_file_gaussian_node, level) == 100, "node layout");
-static_assert(sizeof(trip_file_gaussian_brick) == 192, "brick size");
+static_assert(sizeof(trip_file_gaussian_brick) == 208, "brick size");
 static_assert(offsetof(trip_file_gaussian_brick, first_record) == 96, "brick layout");
 static_assert(offsetof(trip_file_gaussian_brick, checksums) == 160, "brick layout");
+static_assert(offsetof(trip_file_gaussian_brick, cone_axis) == 192, "brick layout");
+
+/* Returns whether the normals of a scene's Gaussians point away from front sides. */
+static inline bool trip_gaussian_has_sides(const trip_file_gaussian_header *h)
+{
+    const uint32_t surfels = TRIP_GAUSSIAN_FLAT | TRIP_GAUSSIAN_CLOUD;
+    return (h->flags & surfels) == surfels;
+}
 
 /* Returns the number of planes up to a degree. With a palette, one plane serves all degrees. */
 static inline unsigned trip_gaussian_plane_count(const trip_file_gaussian_header *h, int degree)

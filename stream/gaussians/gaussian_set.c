@@ -221,11 +221,12 @@ int trip_gaussian_set_read(const trip_gaussian_set *s, int axis, uint64_t brick,
 }
 
 /* Returns why the records of a brick cannot be right, or NULL. */
-static const char *fault_of_records(const unsigned char *records, uint32_t count, int axis)
+static const char *fault_of_records(const trip_gaussian_set *s, const trip_file_gaussian_brick *b,
+                                    const unsigned char *records, int axis)
 {
-    for (uint32_t i = 0; i < count; i++) {
+    for (uint32_t i = 0; i < b->records; i++) {
         const unsigned char *r = records + (size_t)i * TRIP_GAUSSIAN_RECORD_BYTES;
-        const char *fault = trip_gaussian_record_fault(r);
+        const char *fault = trip_gaussian_record_fault(b, &s->header, r);
         if (fault)
             return fault;
         if (i && trip_gaussian_centre_code(r, axis) <
@@ -261,7 +262,7 @@ static int verify_brick(const trip_gaussian_set *s, int axis, uint64_t brick, un
     }
     if (status == TRIP_OK)
         status = trip_gaussian_set_read(s, axis, brick, 0, room);
-    const char *fault = status == TRIP_OK ? fault_of_records(room, b->records, axis) : NULL;
+    const char *fault = status == TRIP_OK ? fault_of_records(s, b, room, axis) : NULL;
     return fault
                ? trip_fail(TRIP_ERROR, "read",
                            set_where(s, trip_gaussian_plane_name(&s->header, axis, 0, name), where),

@@ -140,6 +140,7 @@ RENDER = {
     "--order": NAMES,
     "--sheet": NUMBERS + ["0", "-1", "1e13"],
     "--sh": NUMBERS + ["-1", "4", "1.5"],
+    "--sides": NAMES,
     "--normalise": None,
     "--flatten": NUMBERS + ["0", "0.5", "1e9"],
     "--target": NAMES,

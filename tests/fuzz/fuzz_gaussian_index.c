@@ -1,7 +1,8 @@
 /* Fuzzes index.trip of Gaussian scenes. The input gets valid checksums and sizes, so that the
  * fuzzer reaches the code behind these checks. The bricks of an accepted index must follow one
- * another, and their records must decode to finite values. At each level of detail, the nodes that
- * are drawn share out each Gaussian of the scene. */
+ * another, and their records must decode to finite values. Their cones must have an axis of unit
+ * length. At each level of detail, the nodes that are drawn share out each Gaussian of the scene.
+ */
 #include "fuzz.h"
 
 #include "gaussian_check.h"
@@ -62,6 +63,13 @@ static void decode_entries(const trip_file_gaussian_header *h, const unsigned ch
     }
 }
 
+static void check_cone(const trip_file_gaussian_brick *b)
+{
+    const float *a = b->cone_axis, length2 = a[0] * a[0] + a[1] * a[1] + a[2] * a[2];
+    FUZZ_PROMISE(b->cone_cosine >= 0 && b->cone_cosine <= 1);
+    FUZZ_PROMISE(b->cone_cosine > 0 ? fabsf(length2 - 1) < 1e-4f : length2 == 0);
+}
+
 static void walk(const trip_file_gaussian_header *h, const unsigned char *index)
 {
     for (int a = 0; a < 3; a++) {
@@ -70,6 +78,7 @@ static void walk(const trip_file_gaussian_header *h, const unsigned char *index)
         for (uint64_t i = 0; i < h->brick_count[a]; i++, b++) {
             FUZZ_PROMISE(b->first_record == next);
             next += b->records;
+            check_cone(b);
             decode(b, h->palette_count ? 0 : (int)h->degree);
         }
         FUZZ_PROMISE(next == h->list_records);

@@ -18,7 +18,7 @@ static draw_settings full(void)
         " --flatten 3 --h 0 --kernel-radius 2.5 --low-pass ewa --low-pass-width 0"
         " --method clip --normalise --submit indexed --submit triangles --target rgba16f "
         "--traversal ascending"
-        " --weights vertex --order lists --sheet 0.125 --sh 2";
+        " --weights vertex --order lists --sheet 0.125 --sh 2 --sides front";
     draw_settings s = { .has_background = 0 };
     assert_int_equal(draw_settings_read_text(&s, options), 0);
     char *text = draw_settings_text(&s);
