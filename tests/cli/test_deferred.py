@@ -193,6 +193,7 @@ class Deferred(program.ProgramTest):
         self.assertEqual(rows["single"]["surfels"], 300)
         # half of a ball is hidden, and pixels hold several points
         self.assertTrue(0.5 < rows["single"]["culled"] < 0.95)
+        self.assertEqual([r["away"] for r in rows.values()], [0, 0, 0])  # one brick faces all sides
         for r in tables["selection"]["rows"]:
             self.assertAlmostEqual(r["speedup"], r["fps"] / r["without_fps"], places=6)
         reads = {(r["scene"], r["selection"]): r["bytes"] for r in tables["passes"]["rows"]}

@@ -216,6 +216,54 @@ static void two_positive_deviations_and_an_opacity_give_mass(void **state)
     }
 }
 
+/* Returns surfel `i` of a square of 10 x 10. Its normal is (0, 0, 1), or the opposite, and turned
+ * by a quaternion. */
+static trip_gaussian surfel(int i, bool opposite, const double q[4])
+{
+    trip_gaussian g = { .deviations = { 0.05f, 0.05f, 0 }, .opacity = 1 };
+    const double at[3] = { 0.1 * (i % 10), 0.1 * (i / 10 % 10), 0 };
+    const double t[3] = { 2 * (q[2] * at[2] - q[3] * at[1]), 2 * (q[3] * at[0] - q[1] * at[2]),
+                          2 * (q[1] * at[1] - q[2] * at[0]) };
+    g.centre[0] = at[0] + q[0] * t[0] + q[2] * t[2] - q[3] * t[1];
+    g.centre[1] = at[1] + q[0] * t[1] + q[3] * t[0] - q[1] * t[2];
+    g.centre[2] = at[2] + q[0] * t[2] + q[1] * t[1] - q[2] * t[0];
+    for (int k = 0; k < 4; k++)
+        g.rotation[k] = (float)q[k];
+    if (opposite) { /* q (0, 0, 1, 0): half a turn about the second axis */
+        const float r[4] = { -(float)q[2], -(float)q[3], (float)q[0], (float)q[1] };
+        memcpy(g.rotation, r, sizeof r);
+    }
+    return g;
+}
+
+static void merged_surfels_keep_the_side_of_most(void **state)
+{
+    (void)state;
+    trip_gaussian g[100];
+    for (int turn = 0; turn < 60; turn++) {
+        double q[4], length = 0;
+        for (int k = 0; k < 4; k++) {
+            q[k] = sin(1 + 7.3 * turn + 2.1 * k * (turn + 1));
+            length += q[k] * q[k];
+        }
+        for (int k = 0; k < 4; k++)
+            q[k] /= sqrt(length);
+        const double n[3] = { 2 * (q[1] * q[3] + q[0] * q[2]), 2 * (q[2] * q[3] - q[0] * q[1]),
+                              1 - 2 * (q[1] * q[1] + q[2] * q[2]) };
+        for (int opposite = 0; opposite <= 100; opposite += 10) {
+            for (int i = 0; i < 100; i++)
+                g[i] = surfel(i, i * 37 % 100 < opposite, q);
+            const trip_gaussian m = merge(g, 100, 0);
+            const trip_vec3 normal = trip_surfel_normal(&m);
+            const double along = normal.x * n[0] + normal.y * n[1] + normal.z * n[2];
+            /* the mean cosine is 1 - opposite / 50, and one half decides */
+            assert_int_equal(m.two_sided, opposite > 25 && opposite < 75);
+            if (opposite != 50)
+                assert_true(opposite < 50 ? along > 0.999 : along < -0.999);
+        }
+    }
+}
+
 /* ---- levels of a bricked scene ---- */
 
 /* Thin balls in a box of 64 * 32 * 16, and large ones among them. */
@@ -414,6 +462,7 @@ int main(void)
         cmocka_unit_test(areas_and_dilogarithms_have_their_known_values),
         cmocka_unit_test(invisible_gaussians_have_no_mass),
         cmocka_unit_test(two_positive_deviations_and_an_opacity_give_mass),
+        cmocka_unit_test(merged_surfels_keep_the_side_of_most),
         cmocka_unit_test(each_level_has_fewer_gaussians_down_to_a_few_thousand),
         cmocka_unit_test(each_gaussian_is_drawn_once_at_any_distance),
         cmocka_unit_test(coarse_gaussians_cover_the_area_of_thin_ones),

@@ -38,6 +38,28 @@ static void every_order_of_the_library_is_an_entry(void **state)
     }
 }
 
+static void deferred_clouds_have_sides(void **state)
+{
+    (void)state;
+    const triptych_scene cloud = { .clouds = 1 }, other = { .degree = 3 };
+    const trip_scene_choice *sides = choice_of(DRAW_SIDES);
+    trip_scene_entry e[TRIP_SCENE_ENTRIES];
+    draw_settings s = { 0 };
+    int chosen;
+    assert_int_equal(trip_scene_entries(sides, &other, &s, e, &chosen), 0);
+    assert_int_equal(trip_scene_entries(sides, &cloud, &s, e, &chosen), 2);
+    assert_string_equal(e[chosen].value, "both");
+    trip_scene_choose(sides, &e[1], &s);
+    assert_int_equal(s.scene.sides, TRIPTYCH_SIDES_FRONT);
+    s.scene.order = TRIPTYCH_ORDER_DEFERRED;
+    assert_int_equal(trip_scene_entries(sides, &cloud, &s, e, &chosen), 2);
+    assert_string_equal(e[chosen].value, "front");
+    s.scene.order = TRIPTYCH_ORDER_DEPTH;
+    assert_int_equal(trip_scene_entries(sides, &cloud, &s, e, &chosen), 0);
+    draw_settings_drop_kind(&s, DRAW_KIND_CLOUD);
+    assert_int_equal(s.scene.sides, TRIPTYCH_SIDES_DEFAULT);
+}
+
 static void entries_that_a_scene_lacks_are_left_out(void **state)
 {
     (void)state;
@@ -139,6 +161,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(every_order_of_the_library_is_an_entry),
+        cmocka_unit_test(deferred_clouds_have_sides),
         cmocka_unit_test(entries_that_a_scene_lacks_are_left_out),
         cmocka_unit_test(the_line_has_count_order_time_and_memory),
         cmocka_unit_test(objects_have_only_the_entries_that_apply_to_all),
