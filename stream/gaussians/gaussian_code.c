@@ -27,9 +27,6 @@ enum {
 
 /* The cosine of a cone is less by this, since readers round normals in other ways. */
 #define CONE_MARGIN 1e-6
-/* Codes of deviations with such a range of logarithms differ by more than the rounding of floats.
- */
-#define CODES_TELL 0.01
 
 typedef struct words {
     uint64_t w[3];
@@ -466,18 +463,15 @@ static void mark_sides(const unsigned char *const *splats, unsigned count, unsig
     }
 }
 
-/* Returns the decoded normal. Codes that are far enough apart tell the shortest axis by
- * themselves. */
+/* Returns the decoded normal. A third deviation of 0 is the least one. */
 static trip_vec3 normal_of(const trip_file_gaussian_brick *b, const unsigned char *record)
 {
     const words r = load(record);
-    const bool told = (double)b->log_hi - (double)b->log_lo > CODES_TELL;
-    trip_gaussian g;
-    decode_rotation(r.w[1], g.rotation);
-    for (int a = 0; a < 3; a++) {
-        const unsigned code = (unsigned)bits(r.w[2], 12 * (unsigned)a, 12);
-        g.deviations[a] = told ? (float)code : decode_deviation(b, code);
-    }
+    trip_gaussian g = { .opacity = 0 };
+    if (bits(r.w[2], 24, 12))
+        decode_shape(b, r, &g);
+    else
+        decode_rotation(r.w[1], g.rotation);
     return trip_surfel_normal(&g);
 }
 
