@@ -98,6 +98,16 @@ static int check_objects(const viewed_volume *s, triptych *t, const char *input,
     return status;
 }
 
+/* A data set of a scene may hold a cloud, which has more settings. */
+static int check_opened(const viewed_volume *s, triptych *t, const triptych_resources *resources)
+{
+    triptych_scene scene;
+    const int status = triptych_get_scene(t, &scene);
+    return status ? status
+                  : draw_settings_check_kind(s->settings, resources,
+                                             scene.clouds ? DRAW_KIND_CLOUD : DRAW_KIND_SCENE);
+}
+
 int viewed_volume_check(const viewed_volume *s, triptych *t, const char *input,
                         const triptych_resources *resources)
 {
@@ -115,6 +125,8 @@ int viewed_volume_check(const viewed_volume *s, triptych *t, const char *input,
     if (cached_volume_wanted(input))
         return check_volume(s, t, input);
     status = triptych_open(t, input, resources);
+    if (!status && is_scene)
+        status = check_opened(s, t, resources);
     if (!status) /* the window prints the warnings later */
         status = library_set_function_quietly(t, &function);
     triptych_close(t);

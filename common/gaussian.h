@@ -15,14 +15,15 @@ typedef struct trip_gaussian {
     float deviations[3]; /* standard deviations along the principal axes, in units of the scene */
     float rotation[4];   /* w, x, y, z; unit length; from the principal axes to the scene */
     float opacity;       /* 0 to 1 */
-    uint16_t merged;     /* 1: of a coarse level, where it stands for Gaussians of the scene */
+    uint8_t merged;      /* 1: of a coarse level, where it stands for Gaussians of the scene */
     /* 1: a coarse surfel that stands for surfels of several sides, so it has no front side */
-    uint16_t two_sided;
+    uint8_t two_sided;
+    uint16_t hidden; /* share of the surroundings that is hidden (openness.h), of 65535 */
     /* Spherical harmonics of the display colour: coefficient, then channel. The colour is 0.5 plus
      * their sum (gaussian_colour.h). Coefficients beyond the scene's degree are 0. */
     float sh[TRIP_SH_MAX][3];
     /* 1: trained with a compensated opacity, as trip_gaussian_settings.antialiased says of all. */
-    uint16_t antialiased;
+    uint8_t antialiased;
     /* 1: the third axis points to the camera that saw it, and the opacity depends on the view
      * (gaussian_picture.h). */
     uint8_t from_camera;

@@ -314,7 +314,7 @@ static const trip_option rows[DRAW_OPTIONS] = {
     [DRAW_EFFECTS] = { "effects", "auto|none|LIST",
                        "Switches effects on: shadows (not with --light head), "
                        "occlusion, emission (requires --emission) and cueing, joined by commas; "
-                       "edl for Gaussian scenes and clouds of points; "
+                       "edl for Gaussian scenes; occlusion and edl for clouds of points; "
                        "auto chooses by the kind of data",
                        "none", .brief = "Switches on shadows, occlusion, cueing, edl, ...",
                        .group = DRAW_GROUP_LIGHT, .type = TRIP_OPTION_CUSTOM, AT(effects.which),

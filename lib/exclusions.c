@@ -343,7 +343,7 @@ static const uint64_t of_both = ROW(BACKGROUND) | ROW(CLIP_BOX) | ROW(CLIP_PLANE
                                 ROW(DEPTH) | ROW(NORMALISE) | ROW(METHOD) | ROW(H) | ROW(LOD) |
                                 ROW(TOLERANCE) | ROW(EFFECTS) | ROW(SHOW);
 
-static const uint64_t of_clouds = ROW(LIGHT) | ROW(NO_SHADING) | ROW(SIDES);
+static const uint64_t of_clouds = ROW(LIGHT) | ROW(NO_SHADING) | ROW(SIDES) | ROW(LIGHT_CELLS);
 
 static const uint64_t not_of_objects = ROW(SHEET) | ROW(LOD) | ROW(MAX_BYTES) | ROW(MAX_MS) |
                                        ROW(SHOW) | ROW(COUNT) | ROW(TEMPERATURE) |
@@ -395,9 +395,10 @@ static uint64_t rows_of_kind(const draw_settings *s, int kind)
 
 int draw_settings_effects_of_kind(int kind)
 {
-    return kind == DRAW_KIND_SCENE   ? TRIPTYCH_EFFECT_EDL
-           : kind == DRAW_KIND_CLOUD ? TRIPTYCH_EFFECT_EDL | TRIPTYCH_EFFECT_AUTO
-                                     : ~TRIPTYCH_EFFECT_EDL;
+    return kind == DRAW_KIND_SCENE ? TRIPTYCH_EFFECT_EDL
+           : kind == DRAW_KIND_CLOUD
+               ? TRIPTYCH_EFFECT_EDL | TRIPTYCH_EFFECT_AUTO | TRIPTYCH_EFFECT_OCCLUSION
+               : ~TRIPTYCH_EFFECT_EDL;
 }
 
 bool draw_settings_applies(const draw_settings *s, int row, int kind)
@@ -459,9 +460,8 @@ int draw_settings_check_kind(const draw_settings *s, const triptych_resources *r
     static const char *const wrong_effects[] = {
         [DRAW_KIND_VOLUME] = "edl applies to Gaussian scenes and clouds of points only",
         [DRAW_KIND_SCENE] =
-            "must be edl or none for Gaussian scenes; clouds of points have auto too",
-        [DRAW_KIND_CLOUD] =
-            "must be edl or none for Gaussian scenes; clouds of points have auto too",
+            "must be edl or none for Gaussian scenes; clouds of points have occlusion and auto too",
+        [DRAW_KIND_CLOUD] = "must be occlusion, edl, auto or none for clouds of points",
         [DRAW_KIND_OBJECTS] = "edl " NOT_OF_OBJECTS,
     };
     const bool objects = kind == DRAW_KIND_OBJECTS;

@@ -13,6 +13,7 @@
 #include "field.h"
 #include "image_file.h"
 #include "light_map.h"
+#include "openness.h"
 #include "lod_parts.h"
 #include "renderer_choice.h"
 #include "library_session.h"
@@ -50,7 +51,12 @@ struct triptych {
     struct trip_gaussian_set *scene; /* the first one; NULL: the data set is a volume */
     struct trip_placed_set *placed;  /* all scenes of the picture */
     unsigned placed_count;
-    uint64_t *placed_drawn;                  /* Gaussians of each, in the begun frame */
+    uint64_t *placed_drawn; /* Gaussians of each, in the begun frame */
+    /* For the occlusion of clouds, one for each of `placed`; equal sets share one. They are kept
+     * from frame to frame. NULL: the last frame had no occlusion. */
+    trip_openness **openness;
+    trip_openness_view *openness_views;
+    bool openness_kept;                      /* from an earlier frame, complete */
     struct trip_mixed *mixed;                /* volumes beside scenes; NULL: none */
     struct trip_gaussian_frame *scene_frame; /* the begun frame of a scene */
     trip_renderer *device_renderer;          /* composites the scene (gl); NULL: `renderer` does */
@@ -209,11 +215,17 @@ int trip_context_verify_scenes(const triptych *t);
 /* Fails with TRIP_USAGE (reported) unless a volume is open. */
 int trip_context_check_volume(const triptych *t);
 trip_view_object trip_context_scene_object(const triptych *t);
-/* Chooses the effects of a frame of a scene, and takes their memory. Its light must be chosen. */
+/* Chooses the effects of a frame of a scene, and takes their memory. Its light must be chosen.
+ * Destroys the lattices of occlusion if the frame does not need them. */
 int trip_context_begin_scene_effects(triptych *t);
 /* Applies the effects to a picture without background, with its distances. */
 void trip_context_apply_scene_effects(triptych *t, float *rgba, const float *distances);
 void trip_context_end_scene_effects(triptych *t);
+/* Does a part of the work before the first surfel can be drawn. Returns TRIP_FRAME_DONE or
+ * TRIP_FRAME_MORE (renderer.h), or a failure. */
+int trip_context_step_scene_effects(triptych *t, uint64_t deadline_ns);
+void trip_context_add_scene_effects(const triptych *t, triptych_frame_stats *stats);
+void trip_context_drop_openness(triptych *t);
 void trip_context_explain_scene_effects(const triptych *t, FILE *out);
 int trip_context_begin_scene(triptych *t);
 int trip_context_step_scene(triptych *t, uint64_t deadline_ns);

@@ -1,6 +1,11 @@
 /* Chooses the effects of a frame, with reasons. Keeps the light map from frame to frame. */
+#include <stdlib.h>
+
+#include "clock.h"
 #include "eye_dome.h"
 #include "library_context.h"
+#include "placed_stream.h"
+#include "renderer.h"
 #include "report.h"
 
 enum { CODES = 65536 };
@@ -237,7 +242,115 @@ static bool suits_eye_dome(triptych *t, bool integral)
     return !integral && !t->lit;
 }
 
-int trip_context_begin_scene_effects(triptych *t)
+/* ---- occlusion of clouds ---- */
+
+/* Whether an earlier object has the same lattice. */
+static bool shares_openness(const triptych *t, unsigned i)
+{
+    bool shared = false;
+    for (unsigned k = 0; k < i && !shared; k++)
+        shared = t->openness[k] == t->openness[i];
+    return shared;
+}
+
+void trip_context_drop_openness(triptych *t)
+{
+    for (unsigned i = t->placed_count; i > 0 && t->openness; i--) {
+        if (!shares_openness(t, i - 1))
+            trip_openness_end(t->openness[i - 1]);
+        t->placed[i - 1].change = (trip_gaussian_change){ NULL, NULL };
+    }
+    free(t->openness);
+    free(t->openness_views);
+    t->openness = NULL;
+    t->openness_views = NULL;
+}
+
+static int take_openness(triptych *t)
+{
+    t->openness = calloc(t->placed_count, sizeof *t->openness);
+    t->openness_views = calloc(t->placed_count, sizeof *t->openness_views);
+    int status = t->openness && t->openness_views
+                     ? 0
+                     : trip_fail(TRIP_ERROR, "render", "occlusion", "out of memory");
+    for (unsigned i = 0; i < t->placed_count && !status; i++) {
+        for (unsigned k = 0; k < i && !t->openness[i]; k++)
+            if (t->placed[k].set == t->placed[i].set)
+                t->openness[i] = t->openness[k];
+        if (!t->openness[i])
+            status = trip_openness_begin(&t->openness[i], t->placed[i].set,
+                                         t->settings.effects.cells, t->session.budget);
+    }
+    if (status)
+        trip_context_drop_openness(t);
+    return status;
+}
+
+static bool is_openness_complete(const triptych *t)
+{
+    bool complete = true;
+    for (unsigned i = 0; i < t->placed_count; i++)
+        complete &= trip_openness_is_complete(t->openness[i]);
+    return complete;
+}
+
+static int begin_openness(triptych *t)
+{
+    int status = t->given.effects.which & TRIPTYCH_EFFECT_OCCLUSION
+                     ? check_effects(t, TRIPTYCH_EFFECT_OCCLUSION)
+                     : 0;
+    const bool runs = !status && !t->mixed && t->given.effects.which & TRIPTYCH_EFFECT_OCCLUSION &&
+                      t->settings.show != TRIP_SHOW_MERGE;
+    if (t->openness &&
+        (!runs || trip_openness_light_cells(t->openness[0]) != t->settings.effects.cells))
+        trip_context_drop_openness(t);
+    if (!runs)
+        return status;
+    t->openness_kept = t->openness && is_openness_complete(t);
+    if (!t->openness)
+        status = take_openness(t);
+    for (unsigned i = 0; i < t->placed_count && !status; i++) {
+        trip_openness_view *v = &t->openness_views[i];
+        *v = trip_openness_view_of(t->openness[i], &t->camera, &t->placed[i].placement);
+        t->placed[i].change = (trip_gaussian_change){ trip_openness_change, v };
+    }
+    return status;
+}
+
+int trip_context_step_scene_effects(triptych *t, uint64_t deadline_ns)
+{
+    const trip_task_runner runner = trip_renderer_runner(t->renderer);
+    int status = TRIP_FRAME_DONE;
+    for (unsigned i = 0; i < t->placed_count && t->openness && status == TRIP_FRAME_DONE; i++)
+        do {
+            status = trip_frame_poll();
+            if (!status)
+                status = trip_openness_step(t->openness[i], &runner);
+        } while (status == TRIP_FRAME_MORE && trip_now_ns() < deadline_ns);
+    if (status < 0)
+        trip_context_drop_openness(t);
+    return status;
+}
+
+void trip_context_add_scene_effects(const triptych *t, triptych_frame_stats *stats)
+{
+    stats->effects |= t->levels ? TRIPTYCH_EFFECT_EDL : 0;
+    for (unsigned i = 0; i < t->placed_count && t->openness; i++) {
+        const trip_light_stats s = trip_openness_stats(t->openness[i]);
+        const bool shared = shares_openness(t, i);
+        stats->effects |= TRIPTYCH_EFFECT_OCCLUSION;
+        stats->light_memory_bytes += shared ? 0 : s.memory_bytes;
+        if (shared || t->openness_kept)
+            continue;
+        stats->light_bytes_read += s.bytes_read;
+        stats->light_gather_ms += s.gather_ms;
+        stats->light_sweep_ms += s.sweep_ms;
+    }
+}
+
+/* ---- effects of Gaussian scenes ---- */
+
+static int begin_eye_dome(triptych *t)
 {
     const bool integral = t->resources.renderer == TRIPTYCH_RENDERER_INTEGRAL;
     const bool given = t->given.effects.which & TRIPTYCH_EFFECT_EDL;
@@ -258,6 +371,12 @@ int trip_context_begin_scene_effects(triptych *t)
                                  "the distances of %d x %d pixels do not fit in memory; raise "
                                  "--memory or lower --size or --samples",
                                  t->camera.width, t->camera.height);
+}
+
+int trip_context_begin_scene_effects(triptych *t)
+{
+    const int status = begin_openness(t);
+    return status ? status : begin_eye_dome(t);
 }
 
 /* Returns the settings. Lengths count in pixels of the picture, also with several rays. */
@@ -284,11 +403,27 @@ void trip_context_end_scene_effects(triptych *t)
     t->levels_bytes = 0;
 }
 
+static void explain_openness(const triptych *t, FILE *out)
+{
+    for (unsigned i = 0; i < t->placed_count; i++) {
+        double cell;
+        const trip_light_grid *g = trip_openness_grid(t->openness[i], &cell);
+        if (!shares_openness(t, i))
+            fprintf(out, "light       %d x %d x %d nodes, %.4g apart: %s\n", g->nodes[0],
+                    g->nodes[1], g->nodes[2], cell,
+                    t->openness_kept ? "kept from the frame before, so nothing is read"
+                                     : "the finest level of the data set is read once");
+    }
+}
+
 void trip_context_explain_scene_effects(const triptych *t, FILE *out)
 {
     const trip_eye_dome e = eye_dome_of(t);
     if (t->mixed)
         return;
+    explain(t, "occlusion", TRIPTYCH_EFFECT_OCCLUSION, t->openness != NULL, out);
+    if (t->openness)
+        explain_openness(t, out);
     explain(t, "edl", TRIPTYCH_EFFECT_EDL, t->levels != NULL, out);
     if (t->levels)
         fprintf(out, "            strength %g, neighbours at %g pixels\n", e.strength, e.radius_px);

@@ -78,6 +78,7 @@ void trip_context_close_scene(triptych *t)
 {
     trip_context_end_scene(t);
     trip_surfel_history_drop(&t->surfel_history, t->session.budget);
+    trip_context_drop_openness(t);
     for (unsigned i = t->placed_count; i > 0; i--)
         if (t->placed[i - 1].set && !is_shared(t, i - 1))
             trip_gaussian_set_close(t->placed[i - 1].set);
@@ -576,7 +577,6 @@ static triptych_frame_stats stats_of(const triptych *t)
             order_of(t) == TRIPTYCH_ORDER_DEFERRED ? -1 : trip_gaussian_termination(&settings),
         .rays = t->drawn_settings.samples,
         .expected_error = -1,
-        .effects = t->levels ? TRIPTYCH_EFFECT_EDL : 0,
         .order = order_of(t),
         .surfels_planned = s.surfels.planned,
         .surfels_away = s.surfels.away,
@@ -593,7 +593,12 @@ enum { REPORT_NS = 50000000 };
 
 int trip_context_step_scene(triptych *t, uint64_t deadline_ns)
 {
-    int status = t->mixed ? trip_context_step_mixed(t, deadline_ns) : TRIP_FRAME_MORE;
+    int status = t->mixed ? trip_context_step_mixed(t, deadline_ns)
+                          : trip_context_step_scene_effects(t, deadline_ns);
+    if (!t->mixed && status == TRIP_FRAME_DONE)
+        status = TRIP_FRAME_MORE; /* the frame is next */
+    else if (!t->mixed)
+        return status;
     while (!t->mixed && status == TRIP_FRAME_MORE) {
         const uint64_t next_ns = trip_now_ns() + REPORT_NS;
         const bool reports = t->show && next_ns < deadline_ns;
@@ -633,6 +638,7 @@ int trip_context_take_scene(triptych *t, float *rgba, float *depth)
         const trip_renderer *r = draws_by_gl(t) ? t->device_renderer : t->renderer;
         snprintf(t->device, sizeof t->device, "%s", r->ops->device(r));
         t->stats = stats_of(t);
+        trip_context_add_scene_effects(t, &t->stats);
         if (t->mixed)
             trip_context_add_mixed_stats(t, &t->stats);
         t->has_stats = true;
@@ -698,13 +704,14 @@ void trip_context_explain_scene(const triptych *t, FILE *out)
     if (order_of(t) == TRIPTYCH_ORDER_DEFERRED) {
         fprintf(out, "footprint   discs%s, with a filter of 0.48 square pixels (EWA)\n",
                 has_front_sides(t) ? " seen from their front sides" : "");
-        return;
+    } else {
+        fprintf(out, "footprint   %s%s\n",
+                settings.shape == TRIP_GAUSSIAN_EXACT ? "exact, along each pixel's ray"
+                : settings.shape == TRIP_GAUSSIAN_EWA
+                    ? "EWA, projected at the centre without limits"
+                    : "projected at the centre, as in training",
+                settings.antialiased ? "; opacity compensated for the blur of pixels" : "");
     }
-    fprintf(out, "footprint   %s%s\n",
-            settings.shape == TRIP_GAUSSIAN_EXACT ? "exact, along each pixel's ray"
-            : settings.shape == TRIP_GAUSSIAN_EWA ? "EWA, projected at the centre without limits"
-                                                  : "projected at the centre, as in training",
-            settings.antialiased ? "; opacity compensated for the blur of pixels" : "");
     trip_context_explain_scene_effects(t, out);
 }
 

@@ -588,14 +588,15 @@ enum {
     /* Matter between a point and the light attenuates the light, and fog scatters it. Not with
      * TRIPTYCH_LIGHT_HEAD. */
     TRIPTYCH_EFFECT_SHADOWS = 1,
-    TRIPTYCH_EFFECT_OCCLUSION = 2, /* matter around a point attenuates the light from everywhere */
+    /* Matter around a point attenuates the light from everywhere. Also for clouds of points. */
+    TRIPTYCH_EFFECT_OCCLUSION = 2,
     TRIPTYCH_EFFECT_CUEING = 4,    /* distant matter fades into the background */
     /* Adds the effects that suit the kind of data and the transfer function. */
     TRIPTYCH_EFFECT_AUTO = 8,
     /* Hot matter radiates as a black body; needs triptych_set_heat(). */
     TRIPTYCH_EFFECT_EMISSION = 16,
     /* Eye-dome lighting: pixels that lie behind their neighbours become darker. For Gaussian scenes
-     * and clouds of points, which have no other effect. Not with the integral renderer. */
+     * and clouds of points. Scenes have no other effect. Not with the integral renderer. */
     TRIPTYCH_EFFECT_EDL = 32,
 };
 
@@ -609,7 +610,7 @@ typedef struct triptych_effects {
      * to 100000. The default of both is 0 and 2500. */
     double kelvin[2];
     /* Shadows, occlusion and emission: cells of the lattice along its longest side, 8 to 1024;
-     * default 128. A cell is at least one voxel long. */
+     * default 128. A cell is at least one voxel long. Clouds of points have half as many. */
     int light_cells;
     /* Eye-dome lighting: its strength, above 0 to 100, default 0.4, and the distance of the
      * neighbours in pixels, 1 to 64, default 1.4. */

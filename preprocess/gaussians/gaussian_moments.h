@@ -67,9 +67,4 @@ void trip_gaussian_moments_add(trip_gaussian_moments *to, const trip_gaussian_mo
 /* Returns the Gaussian that stands for all. */
 trip_gaussian trip_gaussian_moments_merge(const trip_gaussian_moments *m, int degree);
 
-/* Returns a of an ellipsoid from its deviations. */
-double trip_gaussian_mean_area(const double deviations[3]);
-/* Returns Li2(x) for x from 0 to 1. */
-double trip_dilogarithm(double x);
-
 #endif

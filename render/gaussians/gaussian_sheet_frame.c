@@ -128,7 +128,7 @@ static int check_memory(trip_gaussian_sheet_frame *f)
         const trip_gaussian_stream_params p = stream_of(f, &f->passes[i], planes);
         trip_gaussian_plan plan;
         char needed[32], left[32];
-        status = trip_gaussian_stream_plan(f->params.set, &p, f->params.budget, &plan);
+        status = trip_gaussian_stream_plan(f->params.placed->set, &p, f->params.budget, &plan);
         if (status)
             break;
         const trip_gaussian_sheets_params sheets = sheets_of(f, &f->passes[i], &plan);
@@ -152,7 +152,8 @@ static int open_pass(trip_gaussian_sheet_frame *f)
     const pass *p = &f->passes[f->drawn];
     trip_gaussian_plane planes[TRIP_GAUSSIAN_PLANES_MAX];
     const trip_gaussian_stream_params params = stream_of(f, p, planes);
-    int status = trip_gaussian_stream_open(&f->stream, f->params.set, &params, f->params.budget);
+    int status =
+        trip_gaussian_stream_open(&f->stream, f->params.placed->set, &params, f->params.budget);
     if (status)
         return status;
     const trip_gaussian_plan *plan = trip_gaussian_stream_planned(f->stream);
@@ -231,6 +232,8 @@ static int draw_batch(trip_gaussian_sheet_frame *f, size_t *got)
     const double read = trip_now_ms();
     f->stats.read_ms += read - begun;
     f->stats.gaussians += *got;
+    for (size_t i = 0; i < *got; i++)
+        trip_gaussian_change_apply(&f->params.placed->change, &f->batch[i]);
     trip_surfel_light(f->params.settings.light, f->params.camera, f->batch, *got);
     trip_list_colours(f->params.weights, f->passes[f->drawn].axis, f->batch, *got);
     if (!status && *got)

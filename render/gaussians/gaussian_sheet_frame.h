@@ -5,16 +5,16 @@
 #define TRIP_GAUSSIAN_SHEET_FRAME_H
 
 #include "gaussian_picture.h"
-#include "gaussian_set.h"
+#include "placed_stream.h"
 #include "settings.h"
 #include "task_runner.h"
 
 typedef struct trip_gaussian_sheet_frame trip_gaussian_sheet_frame;
 
-/* The set, the camera and the weights must outlive the frame. */
+/* The placed set, the camera and the weights must outlive the frame. */
 typedef struct trip_gaussian_sheet_frame_params {
-    const trip_gaussian_set *set;
-    const trip_camera *camera; /* index space is the scene's space */
+    const trip_placed_set *placed; /* one, where it lies */
+    const trip_camera *camera;     /* index space is the scene's space */
     trip_gaussian_settings settings;
     const trip_settings *weights; /* method and h */
     double thickness;             /* of a sheet, in units of the scene; above 0 */

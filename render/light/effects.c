@@ -1,10 +1,10 @@
 #include "effects.h"
 
 /* The directions lie on a spiral from pole to pole with equal areas (Fibonacci lattice). */
-trip_vec3 trip_effects_direction(int number)
+trip_vec3 trip_even_direction(int number, int count)
 {
     const double golden = 2.39996322972865332; /* pi (3 - sqrt(5)) */
-    double z = 1 - (2 * number + 1.0) / TRIP_OPEN_DIRECTIONS, r = sqrt(1 - z * z);
+    double z = 1 - (2 * number + 1.0) / count, r = sqrt(1 - z * z);
     return trip_v3(r * cos(golden * number), r * sin(golden * number), z);
 }
 

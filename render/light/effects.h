@@ -56,8 +56,13 @@ static inline bool trip_effects_some(const trip_effects *e)
     return TRIP_HAS_EFFECTS && (trip_effects_light(e) || e->emission || e->cueing > 0);
 }
 
-/* The directions for the mean of openness: evenly spread unit vectors. */
-trip_vec3 trip_effects_direction(int number);
+/* Returns one of `count` unit vectors that are spread evenly. */
+trip_vec3 trip_even_direction(int number, int count);
+/* The directions for the mean of openness. */
+static inline trip_vec3 trip_effects_direction(int number)
+{
+    return trip_even_direction(number, TRIP_OPEN_DIRECTIONS);
+}
 
 /* T and m at a point in index space. */
 typedef double (*trip_light_reached)(const void *user, trip_vec3 voxel);

@@ -86,6 +86,8 @@ bool trip_light_sweep_begin(trip_light_sweep *s, trip_vec3 to_light, trip_budget
     const double way[3] = { to_light.x, to_light.y, to_light.z };
     set_axes(s, axis, along > 0);
     s->length = length_of(s, way) / fabs(along) * s->out->spacing;
+    s->per_voxel = 1 / s->out->spacing;
+    s->kept = s->range > 0 ? exp(-s->length / s->range) : 1;
     for (int i = 0; i < 2; i++) {
         const double last = s->out->nodes[i ? s->down : s->across] - 1;
         s->slope[i] = -trip_component(to_light, i ? s->down : s->across) / fabs(along);
@@ -130,6 +132,8 @@ bool trip_light_sweep_begin_at(trip_light_sweep *s, trip_vec3 light, int region,
                                trip_budget *budget)
 {
     s->point = true;
+    s->per_voxel = 1 / s->out->spacing;
+    s->kept = 1;
     set_axes(s, region / 2, region % 2);
     for (int a = 0; a < 3; a++)
         s->light[a] = trip_component(light, a) / s->out->spacing;
@@ -155,23 +159,43 @@ static void cut(double from, double step, double last, double *t0, double *t1)
     *t1 = fmin(*t1, fmax(a, b));
 }
 
+/* Returns whether a step meets no extinction. It stays within the cells around its middle, since no
+ * other axis moves by more than a layer. */
+static bool is_clear(const trip_light_sweep *s, const double from[3], const double step[3])
+{
+    size_t cell = 0;
+    for (int a = 2; a >= 0; a--) {
+        const int cells = s->out->nodes[a] - 1;
+        const double at = (from[a] + 0.5 * step[a]) * s->per_voxel;
+        if (at < -0.5 || at > cells + 0.5)
+            return true; /* all of it lies outside */
+        if (!(at >= 0 && at < cells))
+            return false;
+        cell = cell * (size_t)cells + (size_t)at;
+    }
+    return s->clear[cell] != 0;
+}
+
 /* Returns the optical depth of a column's step, in voxel indices. Two-point Gauss quadrature is
  * exact for cubics, and extinction is cubic within a cell. */
 static double depth_of(const trip_light_sweep *s, const double from[3], const double step[3])
 {
     static const double points[2] = { 0.21132486540518712, 0.78867513459481288 };
     double t0 = 0, t1 = 1, sum = 0;
+    const int parts = s->parts > 1 ? s->parts : 1;
+    if (s->clear && is_clear(s, from, step))
+        return 0;
     for (int a = 0; a < 3; a++)
         cut(from[a], step[a], s->last[a], &t0, &t1);
     if (!(t0 < t1))
         return 0;
-    for (int n = 0; n < 2; n++) {
-        double t = t0 + (t1 - t0) * points[n];
+    for (int n = 0; n < 2 * parts; n++) {
+        double t = t0 + (t1 - t0) * (points[n % 2] + n / 2) / parts;
         sum +=
             trip_light_grid_at(s->extinction, trip_v3(from[0] + t * step[0], from[1] + t * step[1],
                                                       from[2] + t * step[2]));
     }
-    return 0.5 * sum * (t1 - t0) * (s->point ? length_of(s, step) : s->length);
+    return 0.5 / parts * sum * (t1 - t0) * (s->point ? length_of(s, step) : s->length);
 }
 
 /* Computes the rows of a task: `from` to below `to`. */
@@ -192,6 +216,12 @@ static void place_column(const trip_light_sweep *s, int i, double w, double pass
     step[axis] = passed * moved * s->out->spacing;
 }
 
+/* Returns the remaining light of a column after the light that returns over a step. */
+static double returned(const trip_light_sweep *s, double through)
+{
+    return s->kept < 1 ? 1 - (1 - through) * s->kept : through;
+}
+
 /* Advances some rows of columns from the previous layer to this one. Before the first layer all
  * light is left. */
 static void attenuate(void *sweep, unsigned band)
@@ -209,7 +239,7 @@ static void attenuate(void *sweep, unsigned band)
         place_column(s, 1, s->first[1] + row, passed, from, step);
         for (int column = 0; column < s->columns[0]; column++, through++) {
             place_column(s, 0, s->first[0] + column, passed, from, step);
-            const double before = begins ? 1 : *through;
+            const double before = begins ? 1 : returned(s, *through);
             const double depth = before > 0 && passed > 0 ? depth_of(s, from, step) : 0;
             const double left = depth > 0 ? before * exp(-depth) : before;
             *through = left > DARK ? left : 0;

@@ -20,6 +20,13 @@ typedef struct trip_light_sweep {
     const trip_light_grid *extinction; /* per world unit */
     trip_light_grid *out;              /* transmittances are added to it, times `weight` */
     double weight;
+    /* Length over which all but 1/e of the lost light returns, in world units; 0: none returns.
+     * Directional lights only. */
+    double range;
+    int parts; /* of a step, for lattices of extinction with smaller cells; 0 means 1 */
+    /* A byte for each cell of `out`, like nodes but one fewer along each axis. It is not 0 if this
+     * cell and those around it have no extinction. NULL: unknown. */
+    const unsigned char *clear;
     double last[3]; /* last voxel: only [0, last] attenuates */
     const trip_affine *index_to_world;
 
@@ -32,6 +39,8 @@ typedef struct trip_light_sweep {
      */
     double slope[2], spread;
     double length;            /* world length of a step of a directional light */
+    double per_voxel;         /* cells of `out` */
+    double kept;              /* share of the lost light that stays lost over a step */
     int columns[2], first[2]; /* number of columns, one node apart; w of the first column */
     int start;                /* the first layer that the light meets */
     double before;            /* distance from a point light to the first layer, in layers */

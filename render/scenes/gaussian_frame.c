@@ -309,7 +309,7 @@ static int begin_sheets(trip_gaussian_frame *f)
 {
     const trip_gaussian_frame_params *p = &f->params;
     return trip_gaussian_sheet_frame_begin(&f->sheets, &(trip_gaussian_sheet_frame_params){
-                                                           .set = p->sets->set,
+                                                           .placed = p->sets,
                                                            .camera = p->camera,
                                                            .settings = p->settings,
                                                            .weights = &f->weights,

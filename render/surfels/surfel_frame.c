@@ -268,6 +268,7 @@ static uint32_t get_surfel(const void *context, size_t i, trip_gaussian *out)
     out->hyperline = (p->set->set->header.flags & TRIP_GAUSSIAN_HYPERLINES) != 0;
     if (p->brick->share < 1)
         out->opacity = 1 - powf(1 - fminf(out->opacity, 0.99f), p->brick->share);
+    trip_gaussian_change_apply(&p->set->change, out);
     trip_gaussian_transform_apply(&p->set->placement, p->degree, out);
     return p->brick->first + (uint32_t)(i - begin);
 }

@@ -315,7 +315,7 @@ static void decode_shape(const trip_file_gaussian_brick *b, words r, trip_gaussi
         before = code;
     }
     decode_rotation(r.w[1], out->rotation);
-    out->two_sided = (uint16_t)bits(r.w[0], 63, 1);
+    out->two_sided = (uint8_t)bits(r.w[0], 63, 1);
     out->opacity = (float)bits(r.w[1], 38, 12) / OPACITY_MAX;
 }
 
@@ -554,6 +554,7 @@ void trip_gaussian_decode(const trip_file_gaussian_brick *b, const unsigned char
     out->merged = 0;
     out->antialiased = 0;
     out->from_camera = out->hyperline = 0;
+    out->hidden = 0;
     trip_gaussian_decode_centre(b, record, out->centre);
     decode_shape(b, r, out);
     out->sh[0][0] = decode_colour(b, bits(r.w[1], 50, 14), 0);

@@ -319,6 +319,7 @@ static int read_part(const trip_placed_stream *s, part *p, trip_gaussian *out, d
         out[i].antialiased = (h->flags & TRIP_GAUSSIAN_ANTIALIASED) != 0;
         out[i].from_camera = h->flags & TRIP_GAUSSIAN_FROM_CAMERA && !out[i].merged;
         out[i].hyperline = (h->flags & TRIP_GAUSSIAN_HYPERLINES) != 0;
+        trip_gaussian_change_apply(&set->change, &out[i]);
         trip_gaussian_transform_apply(&set->placement, degree, &out[i]);
     }
     if (s->drawn)

@@ -11,9 +11,22 @@
 #include "gaussian_stream.h"
 #include "gaussian_transform.h"
 
+/* Changes a splat in the space of its set, before it is placed. Any thread. NULL: nothing. */
+typedef struct trip_gaussian_change {
+    void (*change)(const void *context, trip_gaussian *g);
+    const void *context;
+} trip_gaussian_change;
+
+static inline void trip_gaussian_change_apply(const trip_gaussian_change *c, trip_gaussian *g)
+{
+    if (c->change)
+        c->change(c->context, g);
+}
+
 typedef struct trip_placed_set {
     trip_gaussian_set *set;            /* only read here */
     trip_gaussian_transform placement; /* a similarity (`even`) */
+    trip_gaussian_change change;
 } trip_placed_set;
 
 /* Sets an affine function of the set's space from one of the common space:

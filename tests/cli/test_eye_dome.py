@@ -121,7 +121,7 @@ class EyeDome(program.ProgramTest):
                 ("v.nrrd", ("--effects", "auto", "--edl-radius", 2), "applies to Gaussian scenes"),
                 ("a.ply", ("--effects", "edl", "--renderer", "integral"), "edl does not apply"),
                 (LAMP, ("--effects", "edl,auto", "--renderer", "integral"), "edl does not apply"),
-                ("a.ply", ("--effects", "edl,cueing"), "must be edl or none"),
+                ("a.ply", ("--effects", "edl,cueing"), "must be occlusion, edl, auto or none"),
                 ("a.ply", ("--edl-strength", "1"), "requires --effects edl"),
                 ("a.ply", ("--edl-radius", "1"), "requires --effects edl"),
                 ("a.ply", ("--effects", "edl", "--edl-strength", "0"), "--edl-strength"),

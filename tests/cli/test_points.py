@@ -355,7 +355,7 @@ class Points(program.ProgramTest):
                                     says="does not apply to Gaussian scenes")
         write_cloud("a.ply", grid(4))
         self.leaves_nothing(2, "render", "a.ply", "-o", "no.png", "--effects", "shadows",
-                            says="must be edl or none")
+                            says="must be occlusion, edl, auto or none")
 
     # ---- up ----
 

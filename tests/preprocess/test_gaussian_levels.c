@@ -4,6 +4,7 @@
 
 #include "brick_gaussians.h"
 #include "gaussian_code.h"
+#include "gaussian_area.h"
 #include "gaussian_moments.h"
 #include "gaussian_set.h"
 #include "gaussian_stream.h"

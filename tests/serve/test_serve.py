@@ -374,9 +374,11 @@ class Serve(program.ProgramTest):
         before, number, _ = self.scene_picture(0, cloud, brick)
         self.assertFalse(self.status()["light"]["shading"])
         for name, value, says in (
-            ("edl", "1", "--effects edl"), ("edl-strength", "2", "--edl-strength 2"),
+            ("occlusion", "1", "--effects occlusion"), ("light-cells", "40", "--light-cells 40"),
+            ("edl", "1", "--effects occlusion,edl"), ("edl-strength", "2", "--edl-strength 2"),
             ("edl-radius", "3", "--edl-radius 3"), ("shading", "1", "--light head"), ("light", "60,20", "--light 0.8"),
             ("light", "60,20,0.4", "--light point:"), ("edl", "0", "--light point:"),
+            ("occlusion", "0", "--light point:"),
             ("shading", "0", "--no-shading"), ("auto", "1", "--effects auto"),
         ):
             self.assertEqual(self.ask("/set", "POST", name=name, value=value)[0], 204, name)
@@ -384,7 +386,7 @@ class Serve(program.ProgramTest):
             self.assertIn(says, camera)
             self.assertTrue((picture != before).any(), name)
             before = picture
-        self.assertEqual([e["name"] for e in self.status()["switches"]], ["auto", "edl"])
+        self.assertEqual([e["name"] for e in self.status()["switches"]], ["occlusion", "auto", "edl"])
         for name, value in ("shadows", "1"), ("cueing", "0.5"), ("shading", "2"), ("edl-radius", "0.5"):
             self.assertEqual(self.ask("/set", "POST", name=name, value=value)[0], 400, name)
         self.tearDown()

@@ -591,14 +591,14 @@ class View(program.ProgramTest):
     def test_each_control_of_a_cloud_draws_the_picture_of_render(self):
         cloud, brick = os.path.join(program.DATASETS, "lamp.ply"), ["--radius=1.5x", "--k=8"]
         controls = ["Shading", "Light from the eye", "Light azimuth", "Light elevation",
-                    "Effects\nclick 0.5 Eye-dome lighting", "Dome strength", "Dome radius", "Shading"]
+                    "Effects\nclick 0.5 Eye-dome lighting", "Dome strength", "Dome radius", "Occlusion", "Shading"]
         script = "wait\npicture 0.exr\nstatus 0.json\n" + "".join(
             f"click 0.2 {text}\nwait\npicture {i + 1}.exr\nstatus {i + 1}.json\n"
             for i, text in enumerate(controls))
         self.each_changes(script, controls, cloud, *brick)
         for i in range(len(controls) + 1):
             self.expect_render(i, f"{i}.json", cloud, brick)
-        self.assertIn("--effects edl --edl-strength", self.status(f"{i}.json")["camera"])
+        self.assertIn("--effects occlusion,edl --edl-strength", self.status(f"{i}.json")["camera"])
         with self.assertRaises(AssertionError):  # the options of bricking count
             self.expect_render(0, "0.json", cloud)
 
