@@ -193,7 +193,8 @@ class Deferred(program.ProgramTest):
         self.assertEqual(rows["single"]["surfels"], 300)
         # half of a ball is hidden, and pixels hold several points
         self.assertTrue(0.5 < rows["single"]["culled"] < 0.95)
-        self.assertEqual([r["away"] for r in rows.values()], [0, 0, 0])  # one brick faces all sides
+        away = [r["away"] for r in rows.values()]  # coarse bricks face all sides, others one
+        self.assertTrue(all(0 <= share < 0.5 for share in away) and max(away) > 0, away)
         for r in tables["selection"]["rows"]:
             self.assertAlmostEqual(r["speedup"], r["fps"] / r["without_fps"], places=6)
         reads = {(r["scene"], r["selection"]): r["bytes"] for r in tables["passes"]["rows"]}
