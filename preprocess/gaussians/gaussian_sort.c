@@ -390,7 +390,7 @@ int trip_gaussian_sort(const trip_gaussian_sort_params *params, trip_budget *bud
 {
     sorter s = { .p = params,
                  .budget = budget,
-                 .stride = trip_spilled_bytes(params->degree),
+                 .stride = params->bytes ? params->bytes : trip_spilled_bytes(params->degree),
                  .file = { .fd = -1 } };
     /* The files of runs and their ends need memory beside the area. */
     const uint64_t left = trip_budget_left_bytes(budget), beside = 4 * OUTPUT_BYTES + left / 16;

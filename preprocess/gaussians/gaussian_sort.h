@@ -25,6 +25,7 @@ typedef struct trip_gaussian_sort_params {
     uint64_t first;           /* splat of the spool that is sorted */
     uint64_t records;
     int degree;
+    size_t bytes;       /* of a spilled splat, a multiple of 8; 0: trip_spilled_bytes(degree) */
     const char *folder; /* for temporary files */
     const char *path;   /* of the data set, for messages */
     /* Sets group and coordinate. It is called once for each splat, before the first emit. Workers

@@ -19,7 +19,7 @@ enum { TILE_SMALL = 1536, OCTANTS = 2, PLACE_BITS = 24, HALVINGS = 8, TILES_FIRS
 enum { FAN = 8, LEVELS_MAX = 24, SLOTS_MAX = 4096, SORTED_BYTES = 1 << 17, TELL_EVERY = 1 << 14 };
 
 /* Candidates are this many times as far outside of a tile as neighbours are in it. */
-#define MARGIN 2.5
+#define MARGIN 3.5
 
 typedef struct box {
     double lo[3], hi[3];
@@ -178,6 +178,7 @@ static int sort(trip_point_tiles *t)
                                                                   .closes = p->spool,
                                                                   .workers = p->workers,
                                                                   .records = p->records,
+                                                                  .bytes = sizeof(trip_point_row),
                                                                   .place = place_row,
                                                                   .folder = p->folder,
                                                                   .path = p->name,

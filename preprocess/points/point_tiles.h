@@ -12,26 +12,26 @@
 
 enum { TRIP_POINT_TILE_MAX = 6144 };
 
-/* A point in a file of tiles. It begins as a trip_gaussian without extent, so that
+/* A point in a file of tiles. Its position stands where a trip_gaussian has its centre, so that
  * trip_gaussian_sort() can sort it. */
 typedef struct trip_point_row {
     trip_spilled head;
     double position[3];
-    float deviations[3]; /* 0 */
     union {
         float scan;
         float uncertainty; /* of an ellipsoid, which has a normal */
         float part;        /* of the tile, once normals are found (point_sides.h) */
     };
-    float normal[3]; /* 0, 0, 0: none */
-    float radius;    /* 0: none */
-    float colour[3]; /* or a value, which a palette colours */
-    float spread;    /* mean distance of the neighbours; 0 until they are found */
+    float normal[3];   /* 0, 0, 0: none */
+    float radius;      /* 0: none */
+    float colour[3];   /* or a value, which a palette colours */
+    float spread;      /* mean distance of the neighbours; 0 until they are found */
+    uint32_t reserved; /* 0 */
 } trip_point_row;
 
-static_assert(offsetof(trip_point_row, deviations) ==
-                  sizeof(trip_spilled) + offsetof(trip_gaussian, deviations),
-              "a row begins as a Gaussian");
+static_assert(offsetof(trip_point_row, position) == sizeof(trip_spilled) &&
+                  offsetof(trip_gaussian, centre) == 0,
+              "the position stands where a Gaussian has its centre");
 
 typedef struct trip_point_tile {
     double lo[3], hi[3];
