@@ -256,7 +256,7 @@ static double away_from(const scene_picture *truth, const scene *s, const scene_
 static void more_samples_per_sheet_converge_to_the_integral(void **state)
 {
     (void)state;
-    for (int i = 0; i < 20; i++) {
+    for (int i = 0; i < 20; i += TEST_BY_TURNS ? 3 : 1) {
         scene s;
         uneven u;
         make_uneven(&u, i < 10 ? 6 : 20);
@@ -518,7 +518,7 @@ static void splats_are_zero_outside_their_support(void **state)
 static void gl_draws_exact_and_near_kernels(void **state)
 {
     (void)state;
-    for (int i = 0; i < 24; i++) {
+    for (int i = 0; i < 24; i += TEST_BY_TURNS ? 7 : 1) {
         scene s;
         uneven u;
         make_uneven(&u, i % 3 ? 6 : 20);
@@ -628,7 +628,7 @@ static void voxels_skipped_by_a_segment_are_visible(void **state)
 static void from_inside_renderers_draw_the_splats_of_the_reference(void **state)
 {
     (void)state;
-    for (int i = 0; i < 16; i++) {
+    for (int i = 0; i < 16; i += TEST_BY_TURNS ? 5 : 1) {
         uneven u;
         make_uneven(&u, i % 4 ? i % 4 * 6 : 3);
         scene s;
