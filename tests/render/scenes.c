@@ -132,10 +132,20 @@ static uint32_t pack_normal(const writing *w, const double gradient[3])
 /* Returns the even bits of a Morton code. */
 static uint32_t even_bits(uint32_t morton)
 {
-    uint32_t u = 0;
-    for (int bit = 0; bit < 16; bit++)
-        u |= (morton >> 2 * bit & 1) << bit;
-    return u;
+    uint32_t u = morton & 0x55555555;
+    u = (u | u >> 1) & 0x33333333;
+    u = (u | u >> 2) & 0x0f0f0f0f;
+    u = (u | u >> 4) & 0x00ff00ff;
+    return (u | u >> 8) & 0x0000ffff;
+}
+
+/* Returns the number of Morton codes that cover a rectangle of cells at the origin. */
+static uint32_t morton_codes(int64_t width, int64_t height)
+{
+    uint32_t side = 1;
+    while (side < width || side < height)
+        side *= 2;
+    return side * side;
 }
 
 /* Gathers the voxels of one tile of a sheet in Morton order, and their normals or deviations. */
@@ -146,7 +156,10 @@ static uint32_t gather_run(const writing *w, unsigned number, int sheet, uint32_
     const scene_part *part = &w->parts[number / 3];
     uint32_t tile = w->params.tile_voxels, count = 0;
     int axis = list->axis, u_axis = (axis + 1) % 3, v_axis = (axis + 2) % 3;
-    for (uint32_t m = 0; m < tile * tile; m++) {
+    const int64_t width = list->dims[u_axis] - (int64_t)tile_u * tile;
+    const int64_t height = list->dims[v_axis] - (int64_t)tile_v * tile;
+    const uint32_t codes = morton_codes(width < tile ? width : tile, height < tile ? height : tile);
+    for (uint32_t m = 0; m < codes; m++) {
         uint32_t u = even_bits(m), v = even_bits(m >> 1);
         int at[3];
         at[axis] = sheet;
@@ -174,7 +187,7 @@ static void append_sheet(const writing *w, unsigned number, int sheet)
     uint32_t tiles_v = (uint32_t)((list->dims[(list->axis + 2) % 3] + tile - 1) / tile);
     const bool has_beside = (w->params.normal_bytes && list->kind == TRIP_KIND_VOXELS) ||
                             w->parts[number / 3].deviation;
-    for (uint32_t m = 0; m < 64 * 64; m++) {
+    for (uint32_t m = 0; m < morton_codes(tiles_u, tiles_v); m++) {
         uint32_t tile_u = even_bits(m), tile_v = even_bits(m >> 1);
         if (tile_u >= tiles_u || tile_v >= tiles_v)
             continue;
