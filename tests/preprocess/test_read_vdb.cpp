@@ -29,6 +29,7 @@ extern "C" {
 }
 
 #include "report.h"
+#include "sanitizers.h"
 #include "scope.h"
 
 namespace
@@ -756,8 +757,8 @@ size_t tree_of(const std::string &file)
     return file.find(std::string((const char *)&background, sizeof background));
 }
 
-/* Inverts each byte of the tree in turn, and opens the file. Leaves out the zeros inside the nodes'
- * masks. */
+/* Inverts each byte of the tree in turn, and opens the file. Sanitized builds invert every third
+ * byte, which reaches every chunk. Leaves out the zeros inside the nodes' masks. */
 void any_wrong_byte_of_a_node_does_no_harm(void **)
 {
     namespace io = openvdb::io;
@@ -766,7 +767,7 @@ void any_wrong_byte_of_a_node_does_no_harm(void **)
                             (uint32_t)(io::COMPRESS_ZIP | io::COMPRESS_ACTIVE_MASK),
                             (uint32_t)(io::COMPRESS_BLOSC | io::COMPRESS_ACTIVE_MASK) }) {
         const std::string whole = tiled_file(flags);
-        for (size_t at = tree_of(whole); at < whole.size(); at++) {
+        for (size_t at = tree_of(whole); at < whole.size(); at += TEST_BY_TURNS ? 3 : 1) {
             if (whole.find_first_not_of('\0', at - 8) > at)
                 continue;
             std::string bad = whole;
