@@ -165,7 +165,8 @@ class Occlusion(program.ProgramTest):
         other = self.picture("corner.ply", *view, "--renderer", "reference")
         self.assertLess(255 * abs(one - other).mean(), 0.05)
         for order in ("--order", "depth"), ("--order", "lists"), ("--order", "sheets", "--sheet", "0.05"), \
-                ("--renderer", "integral"), *(("--renderer", gl, "--order", "lists") for gl in program.GL):
+                ("--renderer", "integral"), *(("--renderer", gl, "--order", order) for gl in program.GL
+                                              for order in ("lists", "deferred")):
             got = self.picture("corner.ply", *view, *order)[20:180, 20:]
             self.assertLess(abs(got[:, :, 0] / got[:, :, 3] - one[20:180, 20:, 0]).mean(), 0.01, order)
 
@@ -196,6 +197,27 @@ class Occlusion(program.ProgramTest):
                          turn=turn)
         seen = abs(both - alone) < 0.01
         self.assertGreater(seen[20:180, 10:].mean(), 0.98)
+
+    def test_each_side_has_its_own_openness(self):
+        """Nothing lies behind a floor with a wall. The object is seen where it lies, and far away."""
+        points, normals = corner(0.02)
+        white("corner.ply", points, normals)
+        shift = numpy.array([3.0, -5, 20])
+        matrix = numpy.eye(4)
+        matrix[:3, 3] = shift
+        program.write("moved.json", str({"objects": [{"data": "corner.ply", "matrix":
+                                                      matrix.ravel().tolist()}]}).replace("'", '"').encode())
+        for name, to in ("corner.ply", 0 * shift), ("moved.json", shift):
+            for lens in (), ("--fov", "5"):
+                seen = []
+                for height in 5, -5:
+                    view = self.view(numpy.array([0.5, 0, height]) + to, numpy.array([0.5, 0, 0]) + to, 0.4,
+                                     size="20x20")
+                    view = view[:3] + (lens or view[3:5]) + view[5:]
+                    seen.append(self.picture(name, *view)[8:12, 8:12, 0])
+                want = openness((0.5, 0, 0), [CORNER_WALL], reach_of(points), 20000)
+                self.assertLess(abs(seen[0] - want).max(), 0.06, (name, lens))
+                self.assertGreater(seen[1].min(), 0.97, (name, lens))
 
     def test_it_costs_nothing_unless_asked_and_is_kept(self):
         points, normals = corner(0.02)
