@@ -565,17 +565,16 @@ static void interpolate(const trip_openness *o, const double at[3], double sums[
     }
 }
 
-double trip_openness_at(const trip_openness *o, const double centre[3], const double *normal)
+double trip_openness_at(const trip_openness *o, const double centre[3], const double normal[3])
 {
     double at[3], sums[CHANNELS], basis[TRIP_SH_MAX], sum = 0;
     for (int a = 0; a < 3; a++)
-        at[a] =
-            (centre[a] - o->origin[a]) / o->cell + (normal ? TRIP_OPENNESS_BIAS * normal[a] : 0);
+        at[a] = (centre[a] - o->origin[a]) / o->cell + TRIP_OPENNESS_BIAS * normal[a];
     interpolate(o, at, sums);
-    trip_sh_basis(2, normal ? trip_v3(normal[0], normal[1], normal[2]) : trip_v3(0, 0, 1), basis);
-    for (int i = 0; i < (normal ? HARMONICS : 1); i++)
+    trip_sh_basis(2, trip_v3(normal[0], normal[1], normal[2]), basis);
+    for (int i = 0; i < HARMONICS; i++)
         sum += basis[i] * sums[i];
-    sum *= (normal ? 1 : 2) / sums[HARMONICS];
+    sum /= sums[HARMONICS];
     return sum > 0 ? sum < 1 ? sum : 1 : 0;
 }
 
@@ -597,13 +596,12 @@ trip_openness_view trip_openness_view_of(const trip_openness *o, const trip_came
 void trip_openness_change(const void *view, trip_gaussian *g)
 {
     const trip_openness_view *v = view;
-    const bool flat = (v->openness->set->header.flags & TRIP_GAUSSIAN_FLAT) != 0;
     const trip_vec3 n = trip_surfel_normal(g);
     double normal[3] = { n.x, n.y, n.z }, facing = 0;
     for (int a = 0; a < 3; a++)
         facing += normal[a] * (v->parallel ? v->eye[a] : v->eye[a] - g->centre[a]);
     for (int a = 0; a < 3 && facing < 0; a++)
         normal[a] = -normal[a];
-    const double open = trip_openness_at(v->openness, g->centre, flat ? normal : NULL);
+    const double open = trip_openness_at(v->openness, g->centre, normal);
     g->hidden = (uint16_t)lround((1 - open) * 65535);
 }

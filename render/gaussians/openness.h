@@ -20,8 +20,6 @@
  * 2001). Interpolation is a normalized convolution (Knutsson & Westin, Normalized and differential
  * convolution, 1993), in which nodes inside matter count less.
  *
- * Ellipsoids have no normal. Their openness is twice the mean of T over all directions, at most 1.
- *
  * One thread calls; a complete lattice is read by any thread. Its size depends on the data and the
  * number of cells alone. */
 #ifndef TRIP_OPENNESS_H
@@ -53,8 +51,8 @@ int trip_openness_light_cells(const trip_openness *o);
 const trip_light_grid *trip_openness_grid(const trip_openness *o, double *cell);
 trip_light_stats trip_openness_stats(const trip_openness *o);
 
-/* Returns the openness, 0 to 1, at a centre with a normal of unit length, or NULL for none. */
-double trip_openness_at(const trip_openness *o, const double centre[3], const double *normal);
+/* Returns the openness, 0 to 1, at a centre with a normal of unit length. */
+double trip_openness_at(const trip_openness *o, const double centre[3], const double normal[3]);
 
 /* A complete lattice, seen by a camera, in the space of the set. */
 typedef struct trip_openness_view {
