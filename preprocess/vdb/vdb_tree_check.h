@@ -1,8 +1,8 @@
 /* Checks a grid's tree in its file and computes its memory before the library builds it. The
- * library allocates the nodes of a tree of any size, writes beyond its buffers if a chunk gives a
- * wrong size, and frees random addresses if a node's values cannot be decompressed. The check reads
- * each node's values once with the library's own functions and skips those of leaves. Only
- * vdb_grid.cpp includes this. */
+ * library allocates the nodes of a tree of any size. It writes beyond its buffers if a chunk gives
+ * a wrong size. It frees random addresses if the values of a node cannot be decompressed. The check
+ * reads the values of nodes once with the library's own functions. It skips the values of leaves.
+ */
 #ifndef TRIP_VDB_TREE_CHECK_H
 #define TRIP_VDB_TREE_CHECK_H
 

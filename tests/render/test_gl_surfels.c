@@ -146,7 +146,7 @@ static void a_tilted_plane_is_closed_and_has_its_depth(void **state)
     close_desk(&d);
 }
 
-/* Of equal surfels a cell takes the one with the least number, in whatever order they come. */
+/* A cell takes the least number among equal surfels, in any order of the batches. */
 static void equal_surfels_are_taken_in_the_order_of_their_numbers(void **state)
 {
     (void)state;
