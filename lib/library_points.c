@@ -255,7 +255,7 @@ static int brick_file(triptych *t, trip_point_file *f, const char *path, const c
     if (status == 0 && o->point_uncertainty && !ranges && !has_poses(info))
         status = trip_fail(TRIP_USAGE, "brick", path,
                            "does not tell where its scanner stood; --uncertainty applies to range "
-                           "images, and to scans with poses in E57, PCD or PTX");
+                           "images, and to scans with poses in E57, PCD, PLY or PTX");
     if (status == 0)
         status = find_up(info, path, o->axes, out->up);
     char *notes = status == 0 ? trip_context_scene_notes(path, out) : NULL;

@@ -1,6 +1,7 @@
 /* Reads clouds of points in PLY: text or binary in either byte order, properties of any type in any
  * order. Faces and other elements after the vertices are ignored. The range_grid of a Stanford scan
- * gives the size of its grid. */
+ * gives the size of its grid. Such a scan by Cyberware's scanner has parallel rays. The scanner
+ * looks along -z. */
 #include "point_file_internal.h"
 
 #include <inttypes.h>
@@ -15,6 +16,9 @@
 #include "report.h"
 
 enum { BUFFER_BYTES = 1 << 18 };
+
+/* The place along z of a scanner with parallel rays. */
+#define FAR_AWAY 1e6
 
 typedef struct ply {
     trip_ply_header header;
@@ -103,6 +107,8 @@ static int find_grid(trip_point_file *f, const ply *p)
         return TRIP_ERROR;
     scan->width = width;
     scan->height = height;
+    scan->posed = number_after(p->header.comments, "is_cyberware_data ") == 1;
+    scan->scanner[2] = scan->posed ? FAR_AWAY : 0;
     return 0;
 }
 

@@ -229,10 +229,15 @@ class RangeImages(program.ProgramTest):
                             says="raise --memory")
 
     def test_points_of_a_scan_are_ellipsoids_along_their_rays(self):
-        """A bumpy surface with a scanner far above, seen at 30 degrees from the scanner. Expected
-        values come from the formulas of point_ellipsoid.h, with all neighbours by brute force."""
+        """A bumpy surface with a scanner above, and one seen along parallel rays. The view is 30
+        degrees beside the scanner. Expected values come from the formulas of point_ellipsoid.h, with
+        all neighbours by brute force."""
+        for name, scanner in ("scan.ptx", [0.4, -0.3, 40]), ("scan.ply", [0, 0, 1e6]):
+            self.check_scan(name, numpy.array(scanner))
+
+    def check_scan(self, name, scanner):
         r = numpy.random.default_rng(11)
-        count, k, scanner = 300, 12, numpy.array([0.4, -0.3, 40])
+        count, k = 300, 12
         points = r.uniform(-1, 1, (count, 3))
         points[:, 2] = 0.5 * points[:, 0] + 0.2 * numpy.sin(3 * points[:, 1]) + r.normal(0, 0.02, count)
         lines = [str(count), "1", " ".join(map(repr, scanner.tolist())),
@@ -240,6 +245,13 @@ class RangeImages(program.ProgramTest):
                  " ".join(map(repr, [*scanner.tolist(), 1])),
                  *[" ".join(map(repr, [*(p - scanner).tolist(), 1.0])) for p in points]]
         program.write("scan.ptx", ("\n".join(lines) + "\n").encode())
+        cells = [f"1 {i // 2}" if i % 2 else "0" for i in range(2 * count)]  # every other one is empty
+        program.write("scan.ply", "\n".join([
+            "ply", "format ascii 1.0", "obj_info is_cyberware_data 1", "obj_info num_cols 2",
+            f"obj_info num_rows {count}", f"element vertex {count}",
+            *(f"property double {axis}" for axis in "xyz"), f"element range_grid {2 * count}",
+            "property list uchar int vertex_indices", "end_header",
+            *(" ".join(map(repr, p.tolist())) for p in points), *cells, ""]).encode())
         away = numpy.linalg.norm(points[:, None] - points, axis=2)
         rays, half, sigma = scanner - points, numpy.empty(count), numpy.empty(count)
         rays /= numpy.linalg.norm(rays, axis=1)[:, None]
@@ -269,7 +281,7 @@ class RangeImages(program.ProgramTest):
             passes *= 1 - numpy.where(alpha < 1 / 255, 0, numpy.minimum(alpha, 0.99))
         eye = 9 * toward
         for options in (), ("--threads", 1, "--memory", "32M"):
-            picture = self.picture("scan.ptx", "--uncertainty", "--size", f"{size}x{size}", "--ortho", height,
+            picture = self.picture(name, "--uncertainty", "--size", f"{size}x{size}", "--ortho", height,
                                    "--eye", ",".join(map(repr, eye.tolist())), "--look", "0,0,0", "--up", "0,1,0",
                                    *options)
             far = numpy.abs(picture[:, :, 3] - (1 - passes))
