@@ -5,7 +5,7 @@
  * most centres. Each surfel gives its optical depth, seen face-on, to the nodes around it, as many
  * times as the cells that it covers. The depth depends on the area, so equal surfaces of more
  * points have equal depths. Light sweeps (light_sweep.h) compute the transmittance T(x, d) of each
- * node x from TRIP_OPENNESS_DIRECTIONS 96even directions d. Light that matter at the distance r
+ * node x from TRIP_OPENNESS_DIRECTIONS even directions d. Light that matter at the distance r
  * takes away counts exp(-r / R) times (obscurance: Zhukov, Iones & Kronin, An ambient light
  * illumination model, 1998). R is TRIP_OPENNESS_RANGE times the diagonal of the box, so closed
  * rooms are not dark.
