@@ -1,7 +1,6 @@
 /* Reads clouds of points in PLY: text or binary in either byte order, properties of any type in any
  * order. Faces and other elements after the vertices are ignored. The range_grid of a Stanford scan
- * gives the size of its grid. Such a scan by Cyberware's scanner has parallel rays. The scanner
- * looks along -z. */
+ * gives the size of its grid. The rays of such a scan are parallel, and go along -z. */
 #include "point_file_internal.h"
 
 #include <inttypes.h>
