@@ -61,8 +61,8 @@ static inline void trip_surfel_set_plane(const trip_camera *c, trip_vec3 normal,
         f->slope_x = by * trip_dot(normal, c->rx);
         f->slope_y = by * trip_dot(normal, c->ry);
     }
-    const double steepness = sqrt(f->slope_x * f->slope_x + f->slope_y * f->slope_y) *
-                             (c->ortho ? 1 : f->z * f->z);
+    const double steepness =
+        sqrt(f->slope_x * f->slope_x + f->slope_y * f->slope_y) * (c->ortho ? 1 : f->z * f->z);
     const double most = TRIP_SURFEL_STEEP * trip_surfel_pixel_width(c, f->z);
     extent = fmax(extent, fmin(steepness, most));
     f->near = fmax(0, f->z - extent);

@@ -49,8 +49,9 @@
  * 3. Blending: each visible surfel with |z(p) - D(p)| <= t adds to pixel p its weight, colour,
  *    tolerance, and coverage. The colour C(p) and the tolerance T(p) are the sums over the weights
  *    divided by the sum of the weights. The opacity A(p) is the sum of the coverages, at most 1.
- *    A pixel without weights but with a finite D has the C and T of the neighbour (of eight) with
- *    the least difference of D. Without such a neighbour it is empty.
+ *    A pixel without weights but with a finite D has the C and T of another pixel: the one with the
+ *    least difference of D, in the least square about the pixel that has any, up to
+ *    TRIP_SURFEL_DONORS pixels away. Without such a pixel it is empty.
  * 4. Edges: the neighbours with weights or an infinite D, and with D > D(p) + T(p), lie behind p.
  *    The mean of their colours, where an infinite D counts as transparent, comes behind p with the
  *    weight 1 - A(p). If no neighbour lies behind p, p is opaque.
@@ -84,6 +85,7 @@
 #define TRIP_SURFEL_MASS_MIN 1e-3
 
 enum {
+    TRIP_SURFEL_DONORS = 16,
     TRIP_SURFEL_GUARD = 40, /* cells beyond each side of the picture */
     TRIP_SURFEL_FINE = 8,   /* cells as wide as pixels; and cells of an octave further out */
 };

@@ -561,15 +561,16 @@ typedef struct picture {
     float *rgba, *depth;
 } picture;
 
-/* The neighbours of a pixel inside the picture, with the pixel itself; inclusive. */
+/* The pixels of the picture about one of them; inclusive. */
 typedef struct square {
     int left, right, top, bottom;
 } square;
 
-static square square_about(const trip_surfels_cpu *s, int x, int y)
+static square square_about(const trip_surfels_cpu *s, int x, int y, int reach)
 {
-    return (square){ x > 0 ? x - 1 : 0, x + 1 < s->camera.width ? x + 1 : x, y > 0 ? y - 1 : 0,
-                     y + 1 < s->camera.height ? y + 1 : y };
+    const int width = s->camera.width, height = s->camera.height;
+    return (square){ x > reach ? x - reach : 0, x + reach < width ? x + reach : width - 1,
+                     y > reach ? y - reach : 0, y + reach < height ? y + reach : height - 1 };
 }
 
 static float depth_at(const trip_surfels_cpu *s, size_t pixel)
@@ -577,18 +578,13 @@ static float depth_at(const trip_surfels_cpu *s, size_t pixel)
     return float_of(s->depths[pixel]);
 }
 
-/* Returns the sums that give pixel `at` its colour, or NULL for none. */
-static const sum *donor_of(const trip_surfels_cpu *s, size_t at, square near)
+/* Returns the sums in a square with the least difference to a depth, or NULL if it has none. */
+static const sum *nearest_in(const trip_surfels_cpu *s, square in, float depth)
 {
-    const float depth = depth_at(s, at);
     const sum *found = NULL;
     float least = INFINITY;
-    if (isinf(depth))
-        return NULL;
-    if (s->sums[at].weight > 0)
-        return &s->sums[at];
-    for (int y = near.top; y <= near.bottom; y++)
-        for (int x = near.left; x <= near.right; x++) {
+    for (int y = in.top; y <= in.bottom; y++)
+        for (int x = in.left; x <= in.right; x++) {
             const size_t next = (size_t)y * (size_t)s->camera.width + (size_t)x;
             if (!(s->sums[next].weight > 0))
                 continue;
@@ -597,6 +593,20 @@ static const sum *donor_of(const trip_surfels_cpu *s, size_t at, square near)
                 found = &s->sums[next];
             least = fminf(least, apart);
         }
+    return found;
+}
+
+/* Returns the sums that give pixel `at` its colour, or NULL for none. */
+static const sum *donor_of(const trip_surfels_cpu *s, size_t at, int x, int y)
+{
+    const float depth = depth_at(s, at);
+    const sum *found = NULL;
+    if (isinf(depth))
+        return NULL;
+    if (s->sums[at].weight > 0)
+        return &s->sums[at];
+    for (int reach = 1; reach <= TRIP_SURFEL_DONORS && !found; reach++)
+        found = nearest_in(s, square_about(s, x, y, reach), depth);
     return found;
 }
 
@@ -628,8 +638,8 @@ static void write_pixel(const picture *p, int x, int y)
 {
     const trip_surfels_cpu *s = p->s;
     const size_t at = (size_t)y * (size_t)s->camera.width + (size_t)x;
-    const square near = square_about(s, x, y);
-    const sum *own = donor_of(s, at, near);
+    const square near = square_about(s, x, y, 1);
+    const sum *own = donor_of(s, at, x, y);
     const double *behind = s->settings.background;
     float rgba[4] = { 0 };
     if (own) {

@@ -182,28 +182,38 @@ static void blend_all(trip_surfels_reference *r)
 
 /* ---- edges ---- */
 
+/* Returns the pixel with weights, up to `reach` pixels away, with the least difference to a depth,
+ * or -1 for none. */
+static long nearest_within(const trip_surfels_reference *r, int x, int y, int reach, double depth)
+{
+    const int width = r->camera.width, height = r->camera.height;
+    double least = INFINITY;
+    long found = -1;
+    for (int row = y - reach; row <= y + reach; row++)
+        for (int column = x - reach; column <= x + reach; column++) {
+            const long next = (long)row * width + column;
+            if (row < 0 || row >= height || column < 0 || column >= width ||
+                !(r->sums[next].weight > 0))
+                continue;
+            const double apart = fabs(r->depths[next] - depth);
+            if (apart < least)
+                found = next;
+            least = fmin(least, apart);
+        }
+    return found;
+}
+
 /* Returns the pixel that gives pixel (x, y) its colour, or -1 for none. */
 static long donor_of(const trip_surfels_reference *r, int x, int y)
 {
-    const int width = r->camera.width, height = r->camera.height;
-    const long at = (long)y * width + x;
-    double least = INFINITY;
+    const long at = (long)y * r->camera.width + x;
     long found = -1;
     if (isinf(r->depths[at]))
         return -1;
     if (r->sums[at].weight > 0)
         return at;
-    for (int row = y - 1; row <= y + 1; row++)
-        for (int column = x - 1; column <= x + 1; column++) {
-            const long next = (long)row * width + column;
-            if (row < 0 || row >= height || column < 0 || column >= width ||
-                !(r->sums[next].weight > 0))
-                continue;
-            const double apart = fabs(r->depths[next] - r->depths[at]);
-            if (apart < least)
-                found = next;
-            least = fmin(least, apart);
-        }
+    for (int reach = 1; reach <= TRIP_SURFEL_DONORS && found < 0; reach++)
+        found = nearest_within(r, x, y, reach, r->depths[at]);
     return found;
 }
 

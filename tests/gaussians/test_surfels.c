@@ -256,6 +256,26 @@ static void an_edge_shows_the_surface_behind_it(void **state)
     }
 }
 
+/* A disc of 5 px loses its only cell to a point before it, and hides the plane behind it. Its
+ * pixels get colours from pixels farther away. */
+static void a_disc_that_lost_its_cell_leaves_no_hole(void **state)
+{
+    (void)state;
+    const trip_camera c = surfel_camera(9);
+    surfel_plane(surfels, 9, 0.3, 0);
+    surfels[SURFEL_SIDE * SURFEL_SIDE] = surfel_at(-0.05, -0.05, 5, 0.3, 0);
+    surfels[SURFEL_SIDE * SURFEL_SIDE + 1] = surfel_at(-0.05, -0.05, 4, 1e-4, 0);
+    draw(&one, &c, &plain, surfels, SURFEL_SIDE * SURFEL_SIDE + 2, (way){ 0 });
+    draw_reference(&other, &c, &plain, surfels, SURFEL_SIDE * SURFEL_SIDE + 2);
+    int hidden = 0;
+    for (int at = 0; at < SURFEL_PIXELS; at++) {
+        assert_close((double)one.rgba[4 * at + 3], 1, 1e-6);
+        assert_close((double)other.rgba[4 * at + 3], 1, 1e-6);
+        hidden += fabs((double)one.depth[at] - 5) < 0.1;
+    }
+    assert_in_range(hidden, 25, 100); /* a circle of 4.6 px without its centre */
+}
+
 /* ---- the reference, and the same bits ---- */
 
 static void cpu_draws_the_reference(void **state)
@@ -404,6 +424,7 @@ int main(void)
         cmocka_unit_test(only_the_front_plane_is_seen),
         cmocka_unit_test(scans_of_one_surface_blend),
         cmocka_unit_test(an_edge_shows_the_surface_behind_it),
+        cmocka_unit_test(a_disc_that_lost_its_cell_leaves_no_hole),
         cmocka_unit_test(cpu_draws_the_reference),
         cmocka_unit_test(threads_change_no_bit),
         cmocka_unit_test(order_and_batches_change_no_bit),
