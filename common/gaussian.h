@@ -23,7 +23,7 @@ typedef struct trip_gaussian {
      * their sum (gaussian_colour.h). Coefficients beyond the scene's degree are 0. */
     float sh[TRIP_SH_MAX][3];
     /* 1: trained with a compensated opacity, as trip_gaussian_settings.antialiased says of all. */
-    uint8_t antialiased;
+    uint16_t antialiased; /* two bytes, so that none is padding */
     /* 1: the third axis points to the camera that saw it, and the opacity depends on the view
      * (gaussian_picture.h). */
     uint8_t from_camera;

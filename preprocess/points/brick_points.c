@@ -13,6 +13,7 @@
 #include "point_sides.h"
 #include "point_tiles.h"
 #include "report.h"
+#include "scan_steps.h"
 #include "surfel_shape.h"
 #include "workers.h"
 
@@ -63,7 +64,8 @@ typedef struct bricker {
     uint64_t given;           /* rows of the spool, without tiles */
     /* Mean and sum of squares of the spreads, and the greatest spread that is kept. */
     double spread_mean, spread_squares, spread_max;
-    bool estimates;     /* uncertainties come from neighbours */
+    bool estimates; /* uncertainties come from neighbours */
+    trip_scan_steps *steps;
     double certainty;   /* sum of 1 / uncertainty */
     double uncertainty; /* the mean of point_ellipsoid.h */
     uint64_t outliers;
@@ -146,9 +148,10 @@ static int spool_point(bricker *b, const trip_point *p)
         return 0;
     }
     memcpy(row.position, p->position, sizeof row.position);
-    if (b->estimates)
+    if (b->estimates) {
         row.radius = 0;
-    else
+        trip_scan_steps_note(b->steps, p);
+    } else
         memcpy(row.normal, p->normal, sizeof row.normal);
     if (b->p->uncertain && !b->estimates)
         trip_point_aim(&row, p, b->info->scans[p->scan].scanner);
@@ -194,7 +197,9 @@ static int spool_all(bricker *b)
     b->values_bytes = room * sizeof *b->values;
     b->sample.points = trip_budget_take(b->budget, b->sample_bytes);
     b->values = trip_budget_take(b->budget, b->values_bytes);
-    int status = batch && b->sample.points && b->values ? 0 : fail_memory(b);
+    b->steps = b->estimates ? trip_scan_steps_begin(b->info, b->budget) : NULL;
+    int status =
+        batch && b->sample.points && b->values && (b->steps || !b->estimates) ? 0 : fail_memory(b);
     if (status == 0)
         status = trip_output_create(&b->spool,
                                     &(trip_output_params){ .folder = b->folder,
@@ -311,8 +316,9 @@ static void complete_row(const bricker *b, const trip_neighbours *n, trip_point_
     find_towards(b, row, towards);
     const trip_surfel_shape shape = trip_surfel_shape_of(n, towards);
     if (b->estimates) {
-        trip_point_estimate(row, &shape, b->info->scans[(uint32_t)row->scan].scanner,
-                            b->radius_max);
+        const uint32_t scan = (uint32_t)row->scan;
+        trip_point_estimate(row, &shape, b->info->scans[scan].scanner,
+                            trip_scan_steps_of(b->steps, scan), b->radius_max);
         return;
     }
     for (int a = 0; a < 3 && !has_normal(row); a++) {
@@ -711,6 +717,7 @@ int trip_brick_points(const trip_brick_points_params *params, trip_budget *budge
     const int status = run(&b, result);
     release_tiles(&b);
     trip_point_sides_free(b.sides);
+    trip_scan_steps_end(b.steps);
     release_sample(&b);
     trip_octree_free(&b.octree);
     trip_output_close(&b.spool);

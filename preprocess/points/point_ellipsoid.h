@@ -16,9 +16,11 @@
  * distance 2 h across the ray. Within a sample of a tilted surface, the distance varies by
  * h tan(theta):
  *
- *     h = sqrt(cos theta) s / 2,    sigma^2 = h^2 (1/16 + tan^2 theta) + (r / cos theta)^2
+ *     sigma^2 = h^2 (1/16 + tan^2 theta) + (r / cos theta)^2
  *
- * 1/16 keeps points of a smooth surface from being certain. These formulas are ours, too. */
+ * 1/16 keeps points of a smooth surface from being certain. At the distance z from the scanner,
+ * h = z t / 2, with the tangent t between neighbouring rays (scan_steps.h). Without a range grid,
+ * h = sqrt(cos theta) s / 2. That is too small where scans overlap. These formulas are ours, too. */
 #ifndef TRIP_POINT_ELLIPSOID_H
 #define TRIP_POINT_ELLIPSOID_H
 
@@ -46,20 +48,23 @@ static inline void trip_point_aim(trip_point_row *row, const trip_point *p, cons
     row->uncertainty = p->uncertainty;
 }
 
-/* Sets direction, width and uncertainty of a row from its neighbours. The radius is at most
- * `radius_max`. */
+/* Sets direction, width and uncertainty of a row from its neighbours. `step` is the tangent between
+ * rays, or 0. The radius of a point without it is at most `radius_max`. */
 static inline void trip_point_estimate(trip_point_row *row, const trip_surfel_shape *shape,
-                                       const double camera[3], double radius_max)
+                                       const double camera[3], double step, double radius_max)
 {
     trip_point p = { .footprint = 0 };
     memcpy(p.position, row->position, sizeof p.position);
     trip_point_aim(row, &p, camera);
-    double cosine = 0;
-    for (int a = 0; a < 3; a++)
+    double cosine = 0, away2 = 0;
+    for (int a = 0; a < 3; a++) {
         cosine += (double)row->normal[a] * shape->normal[a];
+        away2 += (camera[a] - p.position[a]) * (camera[a] - p.position[a]);
+    }
     cosine = fmin(1, fmax(cosine, cos(TRIP_RANGE_GRAZING)));
     const double distance = sqrt(2) * fmin(shape->radius, radius_max);
-    const double half = sqrt(cosine) * distance / 2, slope2 = 1 / (cosine * cosine) - 1;
+    const double half = step > 0 ? step * sqrt(away2) / 2 : sqrt(cosine) * distance / 2;
+    const double slope2 = 1 / (cosine * cosine) - 1;
     const double rough = shape->roughness / cosine;
     row->radius = (float)half;
     row->uncertainty = (float)sqrt(half * half * (1.0 / 16 + slope2) + rough * rough);

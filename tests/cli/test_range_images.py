@@ -247,8 +247,8 @@ class RangeImages(program.ProgramTest):
         program.write("scan.ptx", ("\n".join(lines) + "\n").encode())
         cells = [f"1 {i // 2}" if i % 2 else "0" for i in range(2 * count)]  # every other one is empty
         program.write("scan.ply", "\n".join([
-            "ply", "format ascii 1.0", "obj_info is_cyberware_data 1", "obj_info num_cols 2",
-            f"obj_info num_rows {count}", f"element vertex {count}",
+            "ply", "format ascii 1.0", "obj_info is_cyberware_data 1", "obj_info num_cols 1",
+            f"obj_info num_rows {2 * count}", f"element vertex {count}",
             *(f"property double {axis}" for axis in "xyz"), f"element range_grid {2 * count}",
             "property list uchar int vertex_indices", "end_header",
             *(" ".join(map(repr, p.tolist())) for p in points), *cells, ""]).encode())
@@ -288,6 +288,37 @@ class RangeImages(program.ProgramTest):
             self.assertGreater((1 - passes).mean(), 0.3)
             self.assertLess(far.mean(), 0.002)
             self.assertLess(far.max(), 0.02)
+
+    def test_more_scans_do_not_open_a_surface(self):
+        """A scanner sees a floor from above, and four others at grazing angles. The width of a point is
+        that of its own scanner's rays, however near the points of others are. A scan alone has the widths of its grid: halfway between
+        four points its opacity is that of four Gaussians with half their distance as deviation."""
+        side, step = 41, math.radians(1)
+
+        def scan(at, x):
+            """A scan of the floor at the grid of coordinates x, from a place."""
+            a, b = numpy.meshgrid(x, x)
+            rows = numpy.stack([a.ravel(), b.ravel(), 0 * a.ravel()], 1) - at
+            place = " ".join(map(repr, at))
+            head = (f"{len(x)}\n{len(x)}\n{place}\n1 0 0\n0 1 0\n0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n"
+                    f"{place} 1\n")
+            return head + "".join(" ".join(map(repr, r)) + " 1\n" for r in rows.tolist())
+
+        grid = 3 * numpy.tan(step * (numpy.arange(side) - side // 2))
+        above = scan([0, 0, 3], grid)
+        beside = [scan([x, y, 1], grid + 0.01 * i) for i, (x, y) in
+                  enumerate(((4, 0), (-4, 0), (0, 4), (0, -4)), 1)]
+        program.write("one.ptx", above.encode())
+        program.write("two.ptx", (above + "".join(beside)).encode())
+        view = ("--uncertainty", "--size", "200x200", "--eye", "0,0,3", "--look", "0,0,0", "--up", "0,1,0",
+                "--fov", 2 * math.degrees(math.atan(0.25)))  # 400 pixels for the distance of the scanner
+        one, two = (self.picture(name, *view)[:, :, 3] for name in ("one.ptx", "two.ptx"))
+        self.assertGreater((two - one)[20:180, 20:180].min(), -0.02)
+        opacity = 1 / (1 + 1 / 4)  # all are about as uncertain
+        apart = 400 * math.tan(step)
+        alpha = opacity * math.exp(-apart ** 2 / 4 / (apart ** 2 / 4 + 0.3))
+        middle = one[100 + round(apart / 2), 100 + round(apart / 2)]
+        self.assertAlmostEqual(middle, 1 - (1 - alpha) ** 4, delta=0.06)
 
     def test_uncertainty_is_refused_for_what_has_none(self):
         write_cloud("a.ply", grid(4))
