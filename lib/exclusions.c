@@ -364,7 +364,7 @@ static const struct choice {
     { DRAW_KIND_SCENE, DRAW_SHOW, TRIPTYCH_SHOW_LEVELS - TRIPTYCH_SHOW_PICTURE,
       "levels does not apply to Gaussian scenes" },
     { DRAW_KIND_SCENE, DRAW_ORDER, TRIPTYCH_ORDER_DEFERRED - 1,
-      "deferred requires clouds of points alone" },
+      "deferred requires clouds of points alone, not ellipsoids" },
     { DRAW_KIND_OBJECTS, DRAW_ORDER, TRIPTYCH_ORDER_DEFERRED - 1, "deferred " NOT_OF_OBJECTS },
     { DRAW_KIND_OBJECTS, DRAW_ORDER, TRIPTYCH_ORDER_LISTS - 1, "lists " NOT_OF_OBJECTS },
     { DRAW_KIND_OBJECTS, DRAW_ORDER, TRIPTYCH_ORDER_SHEETS - 1, "sheets " NOT_OF_OBJECTS },
@@ -453,14 +453,16 @@ int draw_settings_check_kind(const draw_settings *s, const triptych_resources *r
         [DRAW_KIND_OBJECTS] = { .given = ~rows_of_kind(s, DRAW_KIND_OBJECTS),
                                 .why = NOT_OF_OBJECTS },
     };
-    const struct rule of_sides = { .given = has_sides(s, kind) ? 0 : ROW(SIDES),
-                                   .why = kind == DRAW_KIND_CLOUD
-                                              ? "requires --order deferred"
-                                              : "applies to clouds of points only" };
+    const struct rule of_sides = {
+        .given = has_sides(s, kind) ? 0 : ROW(SIDES),
+        .why = kind == DRAW_KIND_CLOUD ? "requires --order deferred"
+                                       : "applies to clouds of points only, not to ellipsoids"
+    };
     static const char *const wrong_effects[] = {
         [DRAW_KIND_VOLUME] = "edl applies to Gaussian scenes and clouds of points only",
         [DRAW_KIND_SCENE] =
-            "must be edl or none for Gaussian scenes; clouds of points have occlusion and auto too",
+            "must be edl or none for Gaussian scenes and ellipsoids; clouds of points have "
+            "occlusion and auto too",
         [DRAW_KIND_CLOUD] = "must be occlusion, edl, auto or none for clouds of points",
         [DRAW_KIND_OBJECTS] = "edl " NOT_OF_OBJECTS,
     };

@@ -185,12 +185,22 @@ static void describe_surfels(const trip_point_info *info, triptych_gaussians *ou
     memcpy(out->hi, info->hi, sizeof out->hi);
 }
 
-static bool has_poses(const trip_point_info *info)
+/* Fails if a scan has no pose. */
+static int check_poses(const trip_point_info *info, const char *path)
 {
-    bool all = info->scan_count > 0;
-    for (uint32_t i = 0; i < info->scan_count; i++)
-        all = all && info->scans[i].posed;
-    return all;
+    uint32_t posed = 0;
+    while (posed < info->scan_count && info->scans[posed].posed)
+        posed++;
+    if (posed < info->scan_count && info->scan_count > 1)
+        return trip_fail(TRIP_USAGE, "brick", path,
+                         "does not tell where the scanner of scan %u of %u stood, which "
+                         "--uncertainty needs",
+                         posed + 1, info->scan_count);
+    return posed > 0 && posed == info->scan_count
+               ? 0
+               : trip_fail(TRIP_USAGE, "brick", path,
+                           "does not tell where its scanner stood; --uncertainty applies to range "
+                           "images, and to scans with poses in E57, PCD, PLY or PTX");
 }
 
 /* Bricks fused range images. */
@@ -252,10 +262,8 @@ static int brick_file(triptych *t, trip_point_file *f, const char *path, const c
         status = trip_fail(TRIP_USAGE, "brick", path,
                            "is no sequence of range images with poses; --hyperlines applies to "
                            "these alone");
-    if (status == 0 && o->point_uncertainty && !ranges && !has_poses(info))
-        status = trip_fail(TRIP_USAGE, "brick", path,
-                           "does not tell where its scanner stood; --uncertainty applies to range "
-                           "images, and to scans with poses in E57, PCD, PLY or PTX");
+    if (status == 0 && o->point_uncertainty && !ranges)
+        status = check_poses(info, path);
     if (status == 0)
         status = find_up(info, path, o->axes, out->up);
     char *notes = status == 0 ? trip_context_scene_notes(path, out) : NULL;

@@ -120,7 +120,7 @@ static int set_view(trip_point_file *f, long line, char **words, unsigned count)
     pcd *p = f->state;
     for (unsigned i = 0; i < 7; i++)
         if (count != 7 || !trip_text_number(words[i], &p->view[i]) || !isfinite(p->view[i]))
-            return FAULT("VIEWPOINT needs seven numbers");
+            return FAULT("VIEWPOINT needs seven finite numbers");
     return 0;
 }
 

@@ -9,6 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "geometry.h"
 #include "report.h"
 #include "text_lines.h"
 
@@ -75,6 +76,15 @@ static int add_scan(trip_point_file *f, uint64_t width, uint64_t height)
     return 0;
 }
 
+/* Returns whether a matrix maps space to space, and not to a plane. */
+static bool is_pose(double m[4][4])
+{
+    const trip_vec3 x = trip_v3(m[0][0], m[0][1], m[0][2]), y = trip_v3(m[1][0], m[1][1], m[1][2]),
+                    z = trip_v3(m[2][0], m[2][1], m[2][2]);
+    const double lengths = trip_length(x) * trip_length(y) * trip_length(z);
+    return fabs(trip_dot(x, trip_cross(y, z))) > 1e-6 * lengths;
+}
+
 /* Reads the header of the next scan. Leaves p->left at 0 at the end of the file. */
 static int begin_scan(trip_point_file *f)
 {
@@ -99,6 +109,8 @@ static int begin_scan(trip_point_file *f)
         height != floor(height))
         return FAULT("a scan states a grid of %g x %g", width, height);
     memcpy(p->matrix, v[6], sizeof p->matrix);
+    if (!is_pose(p->matrix))
+        return FAULT("the matrix of a scan has no inverse");
     p->cells = p->left = (uint64_t)width * (uint64_t)height;
     p->scans++;
     return p->scans > f->info.scan_count ? add_scan(f, (uint64_t)width, (uint64_t)height) : 0;

@@ -135,6 +135,7 @@ class Text(PointTest):
         self.refused("b.ptx", scans.replace(b"50\n20\n", b"50\n1e9\n"), "scan 2 states 50000000000 points")
         self.refused("b.ptx", scans.replace(b"50\n20\n", b"50\nabc\n"), "\"abc\" is no number")
         self.refused("b.ptx", scans.replace(b"50\n20\n", b"-50\n20\n"), "states a grid of -50 x 20")
+        self.refused("b.ptx", scans.replace(b"0.0 1.0 0.0 0.0\n", b"0.0 0.0 0.0 0.0\n"), "has no inverse")
 
     def test_damaged_texts(self):
         good = rows(POSITIONS)
