@@ -119,6 +119,7 @@ struct triptych {
     char no_trial[512];       /* why the trial failed; empty if it did not */
 
     trip_clip cut; /* further half-spaces in world space, beside the clip of the settings */
+    int slab_cuts; /* the last ones of `cut` bound a slab, and take no matter from the light */
     bool has_view;
     trip_camera_params view, turned;
     trip_vec3 axis;      /* axis of triptych_turn() */

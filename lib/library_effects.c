@@ -148,6 +148,23 @@ static int begin_heat(triptych *t)
                                         });
 }
 
+/* Returns the clip of the matter that takes light, in index space: without the slab that is drawn.
+ */
+static trip_clip clip_of_light(const triptych *t)
+{
+    const trip_dataset *data = t->at_level ? t->at_level : t->session.data;
+    trip_clip clip = t->drawn_settings.clip;
+    const int first = t->cut.count - t->slab_cuts;
+    if (!t->slab_cuts)
+        return t->plan.clip;
+    clip.count -= t->slab_cuts;
+    for (int i = first; i < clip.count; i++)
+        clip.planes[i] = clip.planes[i + t->slab_cuts];
+    clip = trip_clip_before(&clip, &t->camera.index_to_world);
+    trip_clip_simplify(&clip, data->header.dims);
+    return clip;
+}
+
 static int begin_light(triptych *t)
 {
     const triptych_resources *r = &t->resources;
@@ -156,11 +173,12 @@ static int begin_light(triptych *t)
         return 0;
     }
     int status = t->light ? 0 : trip_light_map_create(&t->light, t->session.budget);
+    const trip_clip clip = clip_of_light(t);
     const trip_light_source source = {
         .data = t->at_level ? t->at_level : t->session.data,
         .level = t->level,
         .settings = &t->drawn_settings,
-        .clip = &t->plan.clip,
+        .clip = &clip,
         .table = t->session.table,
         .engine = (trip_engine)r->engine,
         .threads = trip_context_threads(r->threads),

@@ -350,7 +350,7 @@ static trip_depth_range slab_of(const struct trip_mixed *m)
                                m->slab < m->cut_count ? m->cuts[m->slab] : INFINITY };
 }
 
-/* Returns the half-spaces of a slab and of the picture's clip, in the space of a volume. The first
+/* Returns the half-spaces of the picture's clip and of a slab, in the space of a volume. The first
  * slab with volumes needs no plane in front, and the last slab none behind. */
 static trip_clip clip_of(const triptych *t, const volume *v, trip_depth_range slab)
 {
@@ -358,6 +358,7 @@ static trip_clip clip_of(const triptych *t, const volume *v, trip_depth_range sl
     const trip_camera *c = &t->camera;
     const double eye = trip_dot(c->forward, c->eye);
     trip_clip clip = trip_context_clip(t);
+    v->t->slab_cuts = (m->slab > 1) + (m->slab + 1 < m->cut_count);
     if (m->slab > 1)
         trip_clip_add(&clip, c->forward, -eye - slab.lo);
     if (m->slab + 1 < m->cut_count)

@@ -196,6 +196,18 @@ class Mixed(program.ProgramTest):
         for options in ("--threads", "2"), ("--threads", "5"):
             self.assertTrue((one == self.picture("a.json", "--size=64x64", *options)).all())
 
+    def test_slabs_take_no_matter_from_the_light(self):
+        """A volume beside a scene is drawn in slabs. Its shadows are those of the volume alone."""
+        tooth = os.path.join(program.DATASETS, "tooth.nhdr")
+        write_scene("far.ply", [row((-500, -500, -500))])
+        write_objects("both.json", {"data": tooth}, {"data": "far.ply"})
+        view = ("--size", "90x90", "--eye", "250,-340,220", "--look", "25,48,56", "--up", "0,0,1", "--fov", "30",
+                "--background", "0,0,0,0")
+        apart = [255 * abs(self.picture("both.json", *view, "--effects", effect) -
+                           self.picture(tooth, *view, "--lod", "0", "--effects", effect)).mean()
+                 for effect in ("none", "shadows", "occlusion")]
+        self.assertLess(max(apart[1:]), 1.2 * apart[0])
+
     def test_settings_without_meaning_are_refused(self):
         write_fog("fog", WHITE)
         write_scene("splats.ply", SPLATS)
