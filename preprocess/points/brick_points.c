@@ -209,6 +209,8 @@ static int spool_all(bricker *b)
                                     b->budget);
     if (status == 0)
         status = spool_points(b, batch);
+    if (status == 0 && b->steps)
+        trip_scan_steps_find(b->steps);
     free(batch);
     if (status == 0 && b->left_out)
         trip_warn(b->p->file_name, "%llu of %llu points lie beyond 1e15; they are left out",

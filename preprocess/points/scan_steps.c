@@ -8,6 +8,7 @@ enum { OCTAVES = 48, PER_OCTAVE = 16, BINS = OCTAVES * PER_OCTAVE };
 /* Counts tangents by their logarithms. Bin 0 begins at 2^-OCTAVES. */
 typedef struct counts {
     uint32_t of[BINS];
+    double median;
 } counts;
 
 struct trip_scan_steps {
@@ -16,7 +17,8 @@ struct trip_scan_steps {
     counts *scans;
     size_t bytes;
     bool any;
-    trip_point last;
+    uint32_t last_scan;
+    double last[3]; /* position */
 };
 
 trip_scan_steps *trip_scan_steps_begin(const trip_point_info *info, trip_budget *budget)
@@ -67,23 +69,20 @@ static double tangent_of(const double scanner[3], const double p[3], const doubl
 
 void trip_scan_steps_note(trip_scan_steps *s, const trip_point *p)
 {
-    if (s->any && s->last.scan == p->scan && has_grid(s, p->scan)) {
-        const double tangent =
-            tangent_of(s->info->scans[p->scan].scanner, s->last.position, p->position);
+    if (s->any && s->last_scan == p->scan && has_grid(s, p->scan)) {
+        const double tangent = tangent_of(s->info->scans[p->scan].scanner, s->last, p->position);
         const double bin = (log2(tangent) + OCTAVES) * PER_OCTAVE;
         if (bin >= 0 && bin < BINS)
             s->scans[p->scan].of[(int)bin]++;
     }
-    s->last = *p;
+    memcpy(s->last, p->position, sizeof s->last);
+    s->last_scan = p->scan;
     s->any = true;
 }
 
-double trip_scan_steps_of(const trip_scan_steps *s, uint32_t scan)
+static double median_of(const counts *c)
 {
     uint64_t all = 0, below = 0;
-    if (!has_grid(s, scan))
-        return 0;
-    const counts *c = &s->scans[scan];
     for (int i = 0; i < BINS; i++)
         all += c->of[i];
     for (int i = 0; i < BINS && all > 0; i++) {
@@ -92,4 +91,15 @@ double trip_scan_steps_of(const trip_scan_steps *s, uint32_t scan)
             return exp2((i + 0.5) / PER_OCTAVE - OCTAVES);
     }
     return 0;
+}
+
+void trip_scan_steps_find(trip_scan_steps *s)
+{
+    for (uint32_t i = 0; i < s->info->scan_count; i++)
+        s->scans[i].median = median_of(&s->scans[i]);
+}
+
+double trip_scan_steps_of(const trip_scan_steps *s, uint32_t scan)
+{
+    return s->scans[scan].median;
 }

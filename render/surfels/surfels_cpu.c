@@ -561,16 +561,15 @@ typedef struct picture {
     float *rgba, *depth;
 } picture;
 
-/* The pixels of the picture about one of them; inclusive. */
+/* The neighbours of a pixel inside the picture, with the pixel itself; inclusive. */
 typedef struct square {
     int left, right, top, bottom;
 } square;
 
-static square square_about(const trip_surfels_cpu *s, int x, int y, int reach)
+static square square_about(const trip_surfels_cpu *s, int x, int y)
 {
-    const int width = s->camera.width, height = s->camera.height;
-    return (square){ x > reach ? x - reach : 0, x + reach < width ? x + reach : width - 1,
-                     y > reach ? y - reach : 0, y + reach < height ? y + reach : height - 1 };
+    return (square){ x > 0 ? x - 1 : 0, x + 1 < s->camera.width ? x + 1 : x, y > 0 ? y - 1 : 0,
+                     y + 1 < s->camera.height ? y + 1 : y };
 }
 
 static float depth_at(const trip_surfels_cpu *s, size_t pixel)
@@ -578,21 +577,27 @@ static float depth_at(const trip_surfels_cpu *s, size_t pixel)
     return float_of(s->depths[pixel]);
 }
 
-/* Returns the sums in a square with the least difference to a depth, or NULL if it has none. */
-static const sum *nearest_in(const trip_surfels_cpu *s, square in, float depth)
+/* Returns the sums on the border of a square with the least difference to a depth, or NULL if it
+ * has none. Smaller squares about the same pixel must have none. */
+static const sum *nearest_on(const trip_surfels_cpu *s, int x, int y, int reach, float depth)
 {
     const sum *found = NULL;
     float least = INFINITY;
-    for (int y = in.top; y <= in.bottom; y++)
-        for (int x = in.left; x <= in.right; x++) {
-            const size_t next = (size_t)y * (size_t)s->camera.width + (size_t)x;
-            if (!(s->sums[next].weight > 0))
+    for (int row = y - reach; row <= y + reach; row++) {
+        const int step = row == y - reach || row == y + reach ? 1 : 2 * reach;
+        if (row < 0 || row >= s->camera.height)
+            continue;
+        for (int column = x - reach; column <= x + reach; column += step) {
+            if (column < 0 || column >= s->camera.width)
                 continue;
+            const size_t next = (size_t)row * (size_t)s->camera.width + (size_t)column;
             const float apart = fabsf(depth_at(s, next) - depth);
-            if (apart < least)
+            if (s->sums[next].weight > 0 && apart < least) {
                 found = &s->sums[next];
-            least = fminf(least, apart);
+                least = apart;
+            }
         }
+    }
     return found;
 }
 
@@ -606,7 +611,7 @@ static const sum *donor_of(const trip_surfels_cpu *s, size_t at, int x, int y)
     if (s->sums[at].weight > 0)
         return &s->sums[at];
     for (int reach = 1; reach <= TRIP_SURFEL_DONORS && !found; reach++)
-        found = nearest_in(s, square_about(s, x, y, reach), depth);
+        found = nearest_on(s, x, y, reach, depth);
     return found;
 }
 
@@ -638,7 +643,7 @@ static void write_pixel(const picture *p, int x, int y)
 {
     const trip_surfels_cpu *s = p->s;
     const size_t at = (size_t)y * (size_t)s->camera.width + (size_t)x;
-    const square near = square_about(s, x, y, 1);
+    const square near = square_about(s, x, y);
     const sum *own = donor_of(s, at, x, y);
     const double *behind = s->settings.background;
     float rgba[4] = { 0 };

@@ -79,3 +79,16 @@ const trip_gaussian *surfel_scene(void)
     }
     return scene;
 }
+
+void surfel_check_hidden(trip_surfels_cpu *s)
+{
+    /* It covers the columns from 0 to 64 or so: the middle of the left edge is its centre. */
+    const trip_gaussian wall = surfel_at(7.5, 0, 5, 8, 0);
+    assert_int_equal(trip_surfels_cpu_add(s, &wall, 1, 0), 0);
+    assert_true(trip_surfels_cpu_hides(s, (double[]){ 3, 30 }, (double[]){ 40, 60 }, 5.1));
+    assert_false(trip_surfels_cpu_hides(s, (double[]){ 3, 30 }, (double[]){ 40, 60 }, 5));
+    assert_false(trip_surfels_cpu_hides(s, (double[]){ 3, 30 }, (double[]){ 140, 60 }, 5.1));
+    assert_true(trip_surfels_cpu_hides(s, (double[]){ -99, 30 }, (double[]){ -10, 60 }, 5.1));
+    assert_false(
+        trip_surfels_cpu_hides(s, (double[]){ -1e30, -1e30 }, (double[]){ 1e30, 1e30 }, 9));
+}

@@ -2,7 +2,7 @@
 #ifndef TRIP_SURFEL_SCENES_H
 #define TRIP_SURFEL_SCENES_H
 
-#include "gaussian_picture.h"
+#include "surfels_cpu.h"
 
 enum {
     SURFEL_WIDTH = 150,
@@ -30,5 +30,9 @@ trip_gaussian *surfel_plane(trip_gaussian *to, double z, double distance, double
 /* A repeatable scene of SURFEL_SCENE surfels: of all directions and sizes, some merged, some near
  * the eye, and two planes. */
 const trip_gaussian *surfel_scene(void);
+
+/* Adds a wall to a picture of surfel_camera(9). It covers the left half. Checks the rectangles that
+ * it hides. */
+void surfel_check_hidden(trip_surfels_cpu *s);
 
 #endif

@@ -379,15 +379,7 @@ static void hidden_rectangles_are_told(void **state)
         trip_surfels_cpu_begin(
             &s, &(trip_surfels_cpu_params){ .camera = &c, .settings = &plain, .budget = budget }),
         0);
-    /* It covers the columns from 0 to 64 or so: the middle of the left edge is its centre. */
-    const trip_gaussian wall = surfel_at(7.5, 0, 5, 8, 0);
-    assert_int_equal(trip_surfels_cpu_add(s, &wall, 1, 0), 0);
-    assert_true(trip_surfels_cpu_hides(s, (double[]){ 3, 30 }, (double[]){ 40, 60 }, 5.1));
-    assert_false(trip_surfels_cpu_hides(s, (double[]){ 3, 30 }, (double[]){ 40, 60 }, 5));
-    assert_false(trip_surfels_cpu_hides(s, (double[]){ 3, 30 }, (double[]){ 140, 60 }, 5.1));
-    assert_true(trip_surfels_cpu_hides(s, (double[]){ -99, 30 }, (double[]){ -10, 60 }, 5.1));
-    assert_false(
-        trip_surfels_cpu_hides(s, (double[]){ -1e30, -1e30 }, (double[]){ 1e30, 1e30 }, 9));
+    surfel_check_hidden(s);
     trip_surfels_cpu_end(s);
     trip_budget_destroy(budget);
 }
